@@ -1,7 +1,7 @@
 """Draws scenes with the original Scenic, 3.1.1 in its 2D mode or 2.1.0. Runs in an environment of its own, which has
 `scenic` and not `scenicq`.
 
-Usage: python draw_scenes.py MAP.xodr OUT
+Usage: python draw_scenes.py MAP.xodr OUT [--as-decided]
 
 Writes OUT/map.geojson (Scenic's own network of the map, as interchange features), then answers requests, one JSON
 object a line on standard input and standard output: {"text": program, "count": scenes, "seed": number, "seconds":
@@ -10,14 +10,17 @@ headings in Scenic's convention) and parameters, or with {"error": text} where S
 all means that none was found in time, nor the first one in "first" seconds, where that is given. {"text": program,
 "witness": values, "labels": objects, "seconds": limit} asks whether the program allows them, see `replay_witness`.
 {"points": how many, "seed": number} and {"elements": points of each, "seed": number} ask the network, see
-`map_answers`.
+`map_answers`. With --as-decided Scenic does what scenicq means to do otherwise, so that all that hangs on it can be
+compared: there is a direction of traffic off the road, and views wider than 120 degrees are whole.
 """
 
 from __future__ import annotations
 
 import functools
 import importlib.metadata
+import inspect
 import json
+import math
 import random
 import sys
 import time
@@ -27,18 +30,21 @@ from typing import Any
 import numpy as np
 import scenic
 import scenic.syntax.translator
+import shapely
 from map_answers import at_points, of_elements
 from network_features import features_of
 from patience import OutOfPatienceError, patience
-from scenic.core.distributions import RejectionException, Samplable
+from scenic.core.distributions import RejectionException
 from scenic.core.errors import InvalidScenarioError
+from scenic.core.regions import SectorRegion
+from scenic.core.type_support import toVector
+from scenic.core.vectors import VectorField, vectorDistributionMethod
 from scenic.domains.driving.roads import Network
 
 MOST_ATTEMPTS = 20_000
 CARLA = "0.9.16"
 """Its version for the blueprints of objects, where it is not installed: the last that has bicycles."""
 INSTALLED = importlib.metadata.version
-SAMPLE_ALL = Samplable.sampleAll
 MODE = {} if INSTALLED("scenic").startswith("2.") else {"mode2D": True}
 
 
@@ -54,25 +60,55 @@ def thing(thing: Any) -> dict[str, Any]:
     }
 
 
-OFF_ROAD: list[Any] = []
-"""Places of the last sample off the road at which it asks for the direction of traffic."""
-KNOWN_OFF_ROAD: list[Any] = []
-"""The same of the program that was compiled last: known places are asked about once."""
+REACH = 20.0
+"""Metres within which the nearest lane gives the direction of traffic off the road, as scenicq has it."""
+FOLLOWED: list[Any] = []
+"""Where the field that is being followed was entered."""
+
+
+@functools.cache
+def lanes_of(network: Any) -> shapely.STRtree:
+    """The areas of its lanes."""
+    return shapely.STRtree([lane.polygons for lane in network.lanes])
 
 
 def _road_direction(self: Any, point: Any) -> Any:
-    """As Scenic's own default, which gives 0 off the road, but told."""
+    """As Scenic's own default, but off the road, where that gives 0, the direction of the nearest lane.
+
+    Where a field is followed, all steps but the first go on as Scenic's.
+    """
+    point = toVector(point)
     element = self.findPointIn(point, self._nominalDirElems, reject=False)
-    if element is None:
-        OFF_ROAD.append(point)
+    if element is not None:
+        return element.orientation[point]
+    if FOLLOWED and FOLLOWED[-1] != point:
         return 0
-    return element.orientation[point]
+    near = lanes_of(self).query_nearest(shapely.Point(point.x, point.y), max_distance=REACH)
+    if not len(near):
+        raise RejectionException("no direction of traffic")
+    return self.lanes[min(near)].orientation[point]
 
 
-def _sample_all(quantities: Any) -> Any:
-    """As Scenic's own, which draws one sample at each call."""
-    OFF_ROAD.clear()
-    return SAMPLE_ALL(quantities)
+@vectorDistributionMethod
+def _follow(self: Any, pos: Any, *arguments: Any, **options: Any) -> Any:
+    """As Scenic's own, but told where it starts."""
+    FOLLOWED.append(pos)
+    try:
+        return FOLLOW(self, pos, *arguments, **options)
+    finally:
+        FOLLOWED.pop()
+
+
+FOLLOW = inspect.unwrap(VectorField.followFrom)
+
+
+def _sector(center: Any, radius: float, heading: float, angle: float, resolution: int) -> Any:
+    """The area of a sector, also of a wide one."""
+    circle = shapely.Point(center.x, center.y).buffer(radius, quad_segs=resolution)
+    if angle >= math.tau - 0.001:
+        return circle
+    rim = [center.offsetRadially(2 * radius, heading + turn) for turn in np.linspace(-angle / 2, angle / 2, 33)]
+    return circle & shapely.Polygon([(each.x, each.y) for each in (center, *rim)])
 
 
 PARSE, COMPILE = scenic.syntax.translator.parse_string, scenic.syntax.translator.compileScenicAST
@@ -98,7 +134,6 @@ def plain(scene: Any) -> dict[str, Any]:
     return {
         "objects": [thing(each) for each in scene.objects],
         "params": {name: value for name, value in values.items() if name != "map"},
-        "directions_off_road": len(OFF_ROAD) + len(KNOWN_OFF_ROAD),
     }
 
 
@@ -118,9 +153,7 @@ def draw(request: dict[str, Any], chart: Path) -> dict[str, Any]:
     started = time.process_time()
     try:
         with patience(request.get("first", request["seconds"])):
-            OFF_ROAD.clear()
             scenario = compiled(request, chart)
-            KNOWN_OFF_ROAD[:] = OFF_ROAD
             if request["count"]:
                 scenes.append(plain(scenario.generate(maxIterations=MOST_ATTEMPTS)[0]))
         with patience(max(0.001, request["seconds"] - (time.process_time() - started))):
@@ -142,10 +175,7 @@ def replayed(request: dict[str, Any], chart: Path) -> dict[str, str]:
         with patience(request["seconds"]):
             with places(found):
                 scenario = compiled(request, chart)
-            answer = replay(scenario, found, request)
-            if answer["replay"] == "refuted" and OFF_ROAD:
-                return {"replay": "open", "why": f"direction off the road: {answer['why']}"}
-            return answer
+            return replay(scenario, found, request)
     except (OutOfPatienceError, RejectionException) as end:
         return {"replay": "open", "why": f"{type(end).__name__}: {end}"}
     except Exception as error:  # a replay that Scenic is not made for
@@ -159,8 +189,10 @@ def main(arguments: list[str]) -> None:
     if MODE:
         scenic.syntax.translator.parse_string = _parse
         scenic.syntax.translator.compileScenicAST = _compile
+    if "--as-decided" in arguments:
         Network._defaultRoadDirection = _road_direction
-        Samplable.sampleAll = staticmethod(_sample_all)
+        VectorField.followFrom = _follow
+        SectorRegion._makePolygons = staticmethod(_sector)
     Network.fromFile = functools.cache(Network.fromFile)  # one map for all programs
     network = Network.fromFile(str(chart))
     collection = {"type": "FeatureCollection", "features": features_of(network)}

@@ -6,6 +6,7 @@ import json
 import shutil
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -41,7 +42,9 @@ class Original:
         map: Its road network, as features of the interchange format.
     """
 
-    def __init__(self, python: Path, chart: Path, work: Path, script: str = "draw_scenes.py") -> None:
+    def __init__(
+        self, python: Path, chart: Path, work: Path, script: str = "draw_scenes.py", options: Sequence[str] = ()
+    ) -> None:
         """Start the process.
 
         Args:
@@ -49,12 +52,13 @@ class Original:
             chart: An OpenDRIVE map.
             work: A folder for the map and for what Scenic keeps beside it.
             script: What runs there.
+            options: Its options.
         """
         work.mkdir(parents=True, exist_ok=True)
         copy = work / chart.name
         if not copy.exists():
             shutil.copy(chart, copy)  # Scenic writes its cache beside the map
-        self._command = [python, "-W", "ignore", HERE / script, copy, work]
+        self._command = [python, "-W", "ignore", HERE / script, copy, work, *options]
         self._log = (work / "scenic.log").open("w", encoding="utf-8")
         self._process = self._started()
         self.map = work / "map.geojson"

@@ -208,8 +208,6 @@ def excuse(text: str, scene: dict[str, Any], why: str = "") -> str:
     """The known difference that may keep a scene from matching, or nothing; `why` is what ours refuses."""
     if why.startswith("wrong-value") and "must be positive" in why:
         return "size that is not positive"
-    if scene.get("directions_off_road"):
-        return "direction off the road"
     if re.search(r"(?:left of|right of|ahead of|behind) Uniform\(.*centerline\.(?:start|end)\b", text):
         return "side of the end of a random line"
     if re.search(r"Point on (?:ego|o\d+)\b", text) and "distance" in text:
@@ -263,7 +261,7 @@ def towns(arguments: argparse.Namespace, python: Path, stack: ExitStack) -> list
     charts, found = maps_of(arguments.maps), list[Town]()
     (arguments.work / "scenes").mkdir(parents=True, exist_ok=True)
     for name in arguments.towns:
-        original = Original(python, charts[name], arguments.work / name)
+        original = Original(python, charts[name], arguments.work / name, options=("--as-decided",))
         stack.callback(original.close)
         network = read_map(convert_xodr(charts[name], arguments.work / "maps", python=str(python)))
         found.append(Town(name, network, Places.of(network), original, arguments.work / "scenes"))
