@@ -39,6 +39,7 @@ class TrackBlock:
         object_starts: Where the members that are objects of each label begin, and where the last one's end, shape
             (n + 1,).
         label_of: The label of each member, shape (m + n + 1,).
+        object_count: How many members are label objects.
         size: How many members there are: m label objects and n egos.
     """
 
@@ -68,8 +69,8 @@ class TrackBlock:
             np.arange(first_object, int(starts[-1])) if rows is None else self._track_rows(starts, rows)
         )
         self.object_starts: Integers = np.searchsorted(self._rows, starts)
-        self._m = len(self._rows)
-        self.size = self._m + n
+        self.object_count = len(self._rows)
+        self.size = self.object_count + n
         self.label_of: Integers = np.concatenate(
             (np.repeat(np.arange(n), np.diff(self.object_starts)), np.arange(n), [-1])
         )
@@ -122,15 +123,21 @@ class TrackBlock:
 
     def ego(self, labels: Integers) -> Integers:
         """The egos of labels."""
-        return labels + self._m
+        return labels + self.object_count
+
+    def present_ego(self, labels: Integers) -> Integers:
+        """The egos of labels; nobody where a label has none."""
+        codes, classes = self.categories()
+        there = np.array([*map(bool, classes), False])[codes[self.ego(labels)]]
+        return np.where(there, self.ego(labels), -1)
 
     def is_ego(self, member: int) -> bool:
         """Whether a member is the ego of its label."""
-        return member >= self._m
+        return member >= self.object_count
 
     def are_egos(self, members: Integers) -> bool:
         """Whether members are egos of their labels, or nobody."""
-        return bool(((members >= self._m) | (members < 0)).all())
+        return bool(((members >= self.object_count) | (members < 0)).all())
 
     def members(self, rows: Integers) -> Integers:
         """The label objects that are in some rows of their part."""
@@ -174,15 +181,16 @@ class TrackBlock:
         """The tracks of members, as numbers: equal for those of one track, unlike for those of two recordings."""
         if self._tracks is None:
             codes, names = self._names()
-            recordings = self.recording_of[self.label_of[: self._m]]
+            recordings = self.recording_of[self.label_of[: self.object_count]]
             known = recordings * len(names) + codes
             # a label object without a track is one of its own; so is the ego of a recording
-            alone = np.arange(self._m) + len(self.runs) * (len(names) + 1)
+            alone = np.arange(self.object_count) + len(self.runs) * (len(names) + 1)
             objects = np.where(codes < len(names), known, alone)
             # so is what a label without an ego has in its place, which is a mere point to look from
-            codes, classes = self.categories()
-            there = np.array([*map(bool, classes), False])[codes[self._m :]]
-            nobody = int(alone[-1] + 1 if self._m else len(self.runs) * (len(names) + 1)) + np.arange(len(there))
+            there = self.present_ego(np.arange(len(self))) >= 0
+            nobody = int(alone[-1] + 1 if self.object_count else len(self.runs) * (len(names) + 1)) + np.arange(
+                len(there)
+            )
             egos = np.where(there, len(self.runs) * len(names) + self.recording_of, nobody)
             self._tracks = np.concatenate((objects, egos))
         return self._tracks[members]

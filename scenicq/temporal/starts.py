@@ -256,13 +256,13 @@ class StartSearch:
         of_label = np.searchsorted(candidates.labels, block.label_of[candidates.members])
         wanted = np.zeros(len(candidates.labels), np.bool_)
         wanted[labels] = True
-        x, y = block.numbers("x"), block.numbers("y")
         egos = block.ego(candidates.labels)
         roles: dict[int, NDArray[np.int64]] = {}
         count = np.ones(len(candidates.labels))
         for index, may in candidates.may.items():
             chosen = np.flatnonzero(may & wanted[of_label])
             if options.radius is not None:
+                x, y = block.numbers("x"), block.numbers("y")
                 mine, ego = candidates.members[chosen], egos[of_label[chosen]]
                 near = (x[mine] - x[ego]) ** 2 + (y[mine] - y[ego]) ** 2 <= options.radius * options.radius
                 chosen = chosen[near]

@@ -104,6 +104,7 @@ class Decider:
         all_matches: Whether every correspondence is a result.
         every: Whether the names of excluded frames are wanted.
         proofs: Whether somebody reads the values that prove matches over time.
+        reasons: Whether somebody reads what frames and bindings fail at in a query over time.
         time: Options of a query over time.
         until: When the time is over; see `check_deadline`.
     """
@@ -116,6 +117,7 @@ class Decider:
     all_matches: bool
     every: bool
     proofs: bool = True
+    reasons: bool = True
     time: IntervalOptions = field(default_factory=IntervalOptions)
     until: float | None = None
     _compiled: dict[str, CompiledMap] = field(default_factory=dict["str", CompiledMap])
@@ -242,7 +244,9 @@ class Decider:
 
             intervals = IntervalMatcher(compiled.scenario, self.options, self.time, self._solver)
             matcher = self._matcher(compiled)
-            self._over_time[name] = RecordingMatcher(self.dataset, matcher, intervals, self.every, self.proofs)
+            self._over_time[name] = RecordingMatcher(
+                self.dataset, matcher, intervals, self.every, self.proofs, self.reasons
+            )
         return self._over_time[name]
 
     def _matcher(self, compiled: CompiledMap) -> Matcher:

@@ -23,6 +23,7 @@ from scenicq.store.track_block import TrackBlock
 from scenicq.store.tracks import TrackKey
 from scenicq.temporal.hidden_runs import Remembered
 from scenicq.temporal.intervals import IntervalMatcher, IntervalVerdict
+from scenicq.temporal.necessary import NecessaryConditions
 from scenicq.temporal.outcomes import Outcome
 from scenicq.temporal.starts import RoleCandidates, StartSearch, narrowed, start_matchers
 from scenicq.temporal.stretches import StartTable
@@ -130,6 +131,7 @@ class RecordingMatcher:
         intervals: For what follows.
         every: Whether bindings without an interval are results, too.
         proofs: Whether somebody reads the values that prove matches.
+        reasons: Whether somebody reads what frames and bindings fail at.
     """
 
     dataset: Dataset
@@ -137,9 +139,11 @@ class RecordingMatcher:
     intervals: IntervalMatcher
     every: bool = True
     proofs: bool = True
+    reasons: bool = True
 
     def __post_init__(self) -> None:
         """Choose what is decided before labels are matched."""
+        self._necessary = None if self.reasons else NecessaryConditions(self.matcher.scenario)
         outcomes = self.intervals.outcomes
         if len(outcomes) == 1:
             # what is decided over time alone is no matter of the initial scene
@@ -160,10 +164,14 @@ class RecordingMatcher:
         found = DecidedRecordings(counts=Counter(recordings=len(rows.runs)))
         if not len(left.labels):
             return found
-        candidates = None if left.rows is None else left.rows.rows
-        with TrackBlock(self.dataset, rows.part, rows.runs, candidates) as block:
+        players = None if left.rows is None else left.rows.rows
+        with TrackBlock(self.dataset, rows.part, rows.runs, players) as block:
             labels = left.labels - block.first_label
-            asked = _Asked(block, labels, self._candidates(block, labels, left), left.read)
+            candidates = self._candidates(block, labels, left)
+            if candidates is not None and self._necessary is not None:
+                candidates = self._necessary.narrow(block, candidates)
+                labels = candidates.labels
+            asked = _Asked(block, labels, candidates, left.read)
             starts = self._starts(asked, self._search, 0, found)
             found.counts["starts"] += len(np.unique(starts.table.labels)) + len(starts.undecided)
             if len(self.intervals.outcomes) > 1:

@@ -332,6 +332,7 @@ class Query:
             all_matches=options.all_matches,
             every=options.every,
             proofs=options.proofs,
+            reasons=options.interval_reasons or options.every,
             time=options.time,
             until=options.until,
         )
