@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any, cast
 
 from scenicq.compiler import operators
 from scenicq.compiler.arithmetic import check_weight, hashed, is_flat, is_random
-from scenicq.compiler.choices import each_existing, regions_apart
 from scenicq.compiler.coerce import property_node, to_heading, to_region, to_scalar, to_vector
 from scenicq.compiler.elements import MISSING, is_of_elements, names_of, of_element, of_network
 from scenicq.compiler.following import follow
 from scenicq.compiler.lookups import look_up
+from scenicq.compiler.random_values import each_existing, regions_apart
 from scenicq.compiler.region_attributes import REGION_METHODS, holds_regions, of_region
 from scenicq.compiler.unavailable import unavailable_attribute
 from scenicq.compiler.values import Builtin, Choice, Instance, ModelValue, Module, ScenicClass, describe, fail, is_node

@@ -15,10 +15,10 @@ from typing import Any, cast
 
 from scenicq.compiler import operators
 from scenicq.compiler.arithmetic import hashed, is_random, plain_binary
-from scenicq.compiler.choices import distribute, is_choice
 from scenicq.compiler.coerce import kind_of_model, to_scalar, to_vector
 from scenicq.compiler.courses import as_test
 from scenicq.compiler.distributions import DISTRIBUTIONS
+from scenicq.compiler.random_values import is_choice
 from scenicq.compiler.region_functions import REGION_FUNCTIONS
 from scenicq.compiler.rounding import rounded, truncated
 from scenicq.compiler.values import Builtin, Choice, Delayed, Instance, ModelValue, ScenicClass, describe, fail, is_node
@@ -127,11 +127,7 @@ _KINDS: dict[str, type] = {
 
 def _is_instance(span: Span, value: ModelValue, classes: ModelValue) -> ModelValue:
     wanted = cast("tuple[ModelValue, ...]", classes) if isinstance(classes, tuple) else (classes,)
-
-    def decide(known: ModelValue) -> bool:
-        return any(_has_class(known, each, span) for each in wanted)
-
-    return distribute(decide, (value,), span, spread=is_choice)
+    return any(_has_class(value, each, span) for each in wanted)
 
 
 def _has_class(value: ModelValue, wanted: ModelValue, span: Span) -> bool:
@@ -163,8 +159,6 @@ def _plain(name: str, function: Callable[..., Any]) -> Builtin:
     """A function of Python that only ever sees known values: each outcome of a random choice by itself."""
 
     def call(span: Span, *args: ModelValue, **named: ModelValue) -> ModelValue:
-        if any(map(is_choice, args)):
-            return distribute(lambda *known: call(span, *known, **named), args, span, spread=is_choice)
         if name in _OF_NUMBERS and args and is_node(args[0]) and is_random(args[0]):
             return _of_random(name, span, *args, **named)
         for arg in args:
@@ -178,7 +172,7 @@ def _plain(name: str, function: Callable[..., Any]) -> Builtin:
         except (ValueError, OverflowError, KeyError):
             raise fail("runtime-error", f"`{name}` cannot be applied to this", span, "failed here") from None
 
-    return Builtin(name, call, known=True)
+    return Builtin(name, call, known=True, spread=is_choice)
 
 
 def _text(value: ModelValue = "") -> str:
@@ -282,7 +276,6 @@ def language_names() -> dict[str, ModelValue]:
         "verbosePrint": _ignore,
         "abs": _abs,
         "sum": _sum,
-        "isinstance": _is_instance,
         "set": _set,
         "frozenset": _set,
         "dict": _dict,
@@ -298,6 +291,7 @@ def language_names() -> dict[str, ModelValue]:
         "len": _length, "int": _whole, "float": _real, "str": _text, "round": _rounded,
     }  # fmt: skip
     names |= {name: _plain(name, function) for name, function in python.items()}
+    names["isinstance"] = Builtin("isinstance", _is_instance, spread=is_choice)
     lists: dict[str, Callable[..., Any]] = {
         "list": lambda v=(): v, "tuple": lambda v=(): tuple(v), "reversed": lambda v: v[::-1],
         "enumerate": lambda v, start=0: list(enumerate(v, start)), "zip": lambda *v: list(zip(*v, strict=False)),

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import replace
+from functools import wraps
 from typing import cast
 
 from scenicq.compiler.values import Choice, Delayed, Instance, ModelValue, describe, fail, is_node
@@ -119,6 +120,21 @@ def _need(value: ModelValue, what: str, span: Span | None) -> Exception:
     return fail("wrong-type", f"{what} is needed here, not {shown}", span, f"this is {shown}", hints)
 
 
+def _of_each_option(
+    read: Callable[[ModelValue, Span | None], Node],
+) -> Callable[[ModelValue, Span | None], Node]:
+    """A reading that takes a random choice, too, as one between what it reads of the options."""
+
+    @wraps(read)
+    def reading(value: ModelValue, span: Span | None) -> Node:
+        if isinstance(value, Choice):
+            return Select(value.index, tuple(reading(option, span) for option in value.options), span=span)
+        return read(value, span)
+
+    return reading
+
+
+@_of_each_option
 def to_node(value: ModelValue, span: Span | None) -> Node:
     """Any value that can be part of an expression."""
     assert not isinstance(value, Delayed)
@@ -132,11 +148,10 @@ def to_node(value: ModelValue, span: Span | None) -> Node:
         return to_vector(value, span)
     if isinstance(value, Instance):
         return to_vector(value, span)
-    if isinstance(value, Choice):
-        return Select(value.index, tuple(to_node(option, span) for option in value.options), span=span)
     raise _need(value, "a number, vector, region or string", span)
 
 
+@_of_each_option
 def to_scalar(value: ModelValue, span: Span | None) -> Node:
     """A number; of truth values 1 is true and 0 is false, as in Python.
 
@@ -151,8 +166,6 @@ def to_scalar(value: ModelValue, span: Span | None) -> Node:
         return constant(float(value), span)
     if is_node(value) and kind_of(cast(Node, value)) in ("scalar", "boolean"):
         return _number(cast(Node, value))
-    if isinstance(value, Choice):
-        return Select(value.index, tuple(to_scalar(option, span) for option in value.options), span=span)
     raise _need(value, "a number", span)
 
 
@@ -171,6 +184,7 @@ def _number(node: Node) -> Node:
     return Select(truth, (constant(0.0, node.span), constant(1.0, node.span)), span=node.span)
 
 
+@_of_each_option
 def to_heading(value: ModelValue, span: Span | None) -> Node:
     """A heading in radians: a number, or the heading of an oriented point or object."""
     if isinstance(value, tuple) and len(cast("tuple[ModelValue, ...]", value)) == 3:
@@ -180,13 +194,12 @@ def to_heading(value: ModelValue, span: Span | None) -> Node:
         return to_scalar(value[0], span)
     if isinstance(value, Instance) and value.oriented:
         return to_scalar(property_node(value, "heading", span), span)
-    if isinstance(value, Choice):
-        return Select(value.index, tuple(to_heading(option, span) for option in value.options), span=span)
     if isinstance(value, Instance) or (is_node(value) and kind_of(cast(Node, value)) not in ("scalar", "boolean")):
         raise _need(value, "a heading", span)
     return any_turn(to_scalar(value, span))
 
 
+@_of_each_option
 def to_vector(value: ModelValue, span: Span | None) -> Node:
     """A vector: a vector, a pair of numbers, or the position of a point or object."""
     if isinstance(value, Instance):
@@ -201,8 +214,6 @@ def to_vector(value: ModelValue, span: Span | None) -> Node:
             return vector(to_scalar(parts[0], span), to_scalar(parts[1], span), span)
     if is_node(value) and kind_of(cast(Node, value)) == "vector":
         return cast(Node, value)
-    if isinstance(value, Choice):
-        return Select(value.index, tuple(to_vector(option, span) for option in value.options), span=span)
     raise _need(value, "a vector", span)
 
 
@@ -250,14 +261,13 @@ def to_field(value: ModelValue, span: Span | None) -> Node:
     raise _need(value, "a vector field", span)
 
 
+@_of_each_option
 def to_boolean(value: ModelValue, span: Span | None) -> Node:
     """A truth value."""
     if isinstance(value, bool):
         return constant(value, span)
     if is_node(value) and kind_of(value) in ("boolean", "scalar"):
         return cast(Node, value)
-    if isinstance(value, Choice):
-        return Select(value.index, tuple(to_boolean(option, span) for option in value.options), span=span)
     if isinstance(value, int | float | str | list | tuple | dict) or value is None:
         return constant(bool(value), span)
     raise _need(value, "a condition", span)

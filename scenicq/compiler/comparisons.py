@@ -11,8 +11,8 @@ from typing import cast
 
 from scenicq.compiler import operators
 from scenicq.compiler.arithmetic import check_weight, hashed, is_flat, is_random, plain_binary
-from scenicq.compiler.choices import distribute, is_choice, possible_values
 from scenicq.compiler.coerce import kind_of_model
+from scenicq.compiler.random_values import holds_instances, is_choice, lift, possible_values
 from scenicq.compiler.values import Choice, Instance, ModelValue, describe, fail, is_node
 from scenicq.errors import Span
 from scenicq.forest import build
@@ -39,7 +39,7 @@ def binary(op: str, left: ModelValue, right: ModelValue, span: Span) -> ModelVal
             return operators.binary(op, a, b, span)
         return plain_binary(op, a, b, span)
 
-    return distribute(known, (left, right), span, spread=is_choice)
+    return lift(known, left, right, span=span, spread=is_choice)
 
 
 def compare(op: str, left: ModelValue, right: ModelValue, span: Span) -> ModelValue:
@@ -48,6 +48,10 @@ def compare(op: str, left: ModelValue, right: ModelValue, span: Span) -> ModelVa
     Raises:
         ScenarioError: wrong-type and its like.
     """
+    return lift(lambda a, b: _compare(op, a, b, span), left, right)
+
+
+def _compare(op: str, left: ModelValue, right: ModelValue, span: Span) -> ModelValue:
     if op in ("in", "not in"):
         return _membership(op, left, right, span)
     if op in _SAMENESS:
@@ -56,7 +60,7 @@ def compare(op: str, left: ModelValue, right: ModelValue, span: Span) -> ModelVa
             if isinstance(same, bool):
                 return same is not _SAMENESS[op]
             return operators.combine("not", [same], span) if _SAMENESS[op] else same
-    return distribute(lambda a, b: _compare_known(op, a, b, span), (left, right), span, spread=is_choice)
+    return lift(lambda a, b: _compare_known(op, a, b, span), left, right, span=span, spread=is_choice)
 
 
 _SAMENESS = {"==": False, "is": False, "!=": True, "is not": True}
@@ -135,7 +139,10 @@ def _membership(op: str, left: ModelValue, right: ModelValue, span: Span) -> Mod
         return not value if isinstance(value, bool) else operators.combine("not", [value], span)
 
     if kind_of_model(right) == "region":
-        return negated(distribute(lambda item, region: operators.within(item, region, span), (left, right), span))
+        inside = lift(
+            lambda item, area: operators.within(item, area, span), left, right, span=span, spread=holds_instances
+        )
+        return negated(inside)
     if isinstance(right, str) and isinstance(left, str):
         return (left in right) == (op == "in")
     if isinstance(right, list | tuple | dict | set | range):

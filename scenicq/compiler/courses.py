@@ -15,10 +15,10 @@ from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from scenicq.compiler.choices import LACKING
 from scenicq.compiler.coerce import kind_of_model
 from scenicq.compiler.environment import Course
 from scenicq.compiler.exclusions import Exclusions
+from scenicq.compiler.random_values import LACKING
 from scenicq.compiler.values import Choice, ModelValue, fail, is_node
 from scenicq.errors import ScenarioError, Span
 from scenicq.forest import build

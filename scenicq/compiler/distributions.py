@@ -7,8 +7,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, cast
 
-from scenicq.compiler.choices import make_choice, nothing_to_choose
 from scenicq.compiler.coerce import to_scalar
+from scenicq.compiler.random_values import make_choice, nothing_to_choose
 from scenicq.compiler.values import Choice, ModelValue, describe, fail, is_node
 from scenicq.errors import Span
 from scenicq.forest.nodes import (

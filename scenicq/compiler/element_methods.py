@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, cast
 
-from scenicq.compiler.choices import map_choice
 from scenicq.compiler.coerce import to_vector
 from scenicq.compiler.following import follow
 from scenicq.compiler.known_properties import as_constant
 from scenicq.compiler.lanes_ahead import lanes_ahead
 from scenicq.compiler.lookups import among, look_up
+from scenicq.compiler.random_values import is_choice, lift
 from scenicq.compiler.road_attributes import worked_out
 from scenicq.compiler.values import Builtin, ModelValue, describe, fail
 from scenicq.errors import Span
@@ -129,7 +129,7 @@ def nominal_directions(run: Interpreter, owner: Network | NetworkElement) -> Bui
     def directions(span: Span, point: ModelValue, reject: ModelValue = None) -> ModelValue:
         found = look_up(run, owner, "nominalDirectionsAt", point, reject, span) if isinstance(owner, Network) else owner
         place = as_constant(run, to_vector(point, span))
-        return map_choice(found, lambda element: _directions(element, place, span), span)
+        return lift(lambda element: _directions(element, place, span), found, span=span, spread=is_choice)
 
     return Builtin("nominalDirectionsAt", directions)
 

@@ -16,7 +16,6 @@ from scenicq.compiler import operators
 from scenicq.compiler.arithmetic import hashed, plain_unary
 from scenicq.compiler.assignment import assign_around, go_through
 from scenicq.compiler.attributes import attribute
-from scenicq.compiler.choices import each_existing, map_choice, nothing_to_choose
 from scenicq.compiler.comparisons import binary, compare, iterate, symbolic
 from scenicq.compiler.courses import option_of
 from scenicq.compiler.distributions import interval
@@ -25,6 +24,7 @@ from scenicq.compiler.items import items_of, length_of, subscript
 from scenicq.compiler.known_properties import as_constant, known_truth
 from scenicq.compiler.logic import condition, connect, invert
 from scenicq.compiler.operations import phrase
+from scenicq.compiler.random_values import each_existing, is_choice, lift, nothing_to_choose
 from scenicq.compiler.texts import checked_text, format_string
 from scenicq.compiler.unread import read
 from scenicq.compiler.values import (
@@ -38,7 +38,6 @@ from scenicq.compiler.values import (
     describe,
     fail,
     is_node,
-    lift,
 )
 from scenicq.errors import Span
 from scenicq.geometry.elements import NetworkElement
@@ -105,7 +104,8 @@ def call(
                 raise fail("wrong-arity", f"`{function.name}` cannot take these arguments", span,
                            str(error).split(") ", 1)[-1].replace("() ", " ")) from None  # fmt: skip
 
-        return lift(now, *args, *named.values()) if function.lifted else now(*args, *named.values())
+        values = (*args, *named.values())
+        return lift(now, *values, span=span, spread=function.spread) if function.lifted else now(*values)
     if isinstance(function, Choice):
         return each_existing(run, function, lambda option: call(run, option, args, named, span), span)
     if isinstance(function, Module) and function.call is not None:
@@ -129,8 +129,6 @@ def _call_each(run: Interpreter, function: ModelValue, choice: Choice, span: Spa
     """`f(*list)` of a random list: an empty list has no scene, as in Scenic, where it is rejected."""
 
     def now(items: ModelValue) -> ModelValue:
-        if isinstance(items, Choice):
-            return _call_each(run, function, items, span)
         given = iterate(items, span)
         if not given:
             raise nothing_to_choose(span)
@@ -164,7 +162,7 @@ def _compare_chain(run: Interpreter, node: ast.ComparisonChain, scope: Environme
         if comparison.operator in ("in", "not in") and _holds_lists(right):
             right = option_of(run, right, comparison.right.span)
         run.budget.pay(length_of(left) + length_of(right), node.span)
-        results.append(lift(lambda a, b, op=comparison.operator: compare(op, a, b, node.span), left, right))
+        results.append(compare(comparison.operator, left, right, node.span))
         left = right
     if len(results) == 1:
         return results[0]
@@ -180,13 +178,14 @@ def _all(values: list[ModelValue], span: Span) -> ModelValue:
 
 
 def _unary(op: str, value: ModelValue, span: Span) -> ModelValue:
-    if isinstance(value, Choice):
-        return map_choice(value, lambda option: _unary(op, option, span), span)
-    if op == "not":
-        return invert(value, span)
-    if is_node(value):
-        return operators.negate(value, span) if op == "-" else value
-    return plain_unary(op, value, span)
+    def known(each: ModelValue) -> ModelValue:
+        if op == "not":
+            return invert(each, span)
+        if is_node(each):
+            return operators.negate(each, span) if op == "-" else each
+        return plain_unary(op, each, span)
+
+    return lift(known, value, span=span, spread=is_choice)
 
 
 def evaluate(run: Interpreter, node: ast.Expression, scope: Environment) -> ModelValue:
@@ -230,9 +229,9 @@ def _evaluate(run: Interpreter, node: ast.Expression, scope: Environment) -> Mod
             return _call(run, node, scope)
         case ast.BinaryOp():
             left, right = evaluate(run, node.left, scope), evaluate(run, node.right, scope)
-            return lift(lambda a, b: binary(node.operator, a, b, span), left, right)
+            return binary(node.operator, left, right, span)
         case ast.UnaryOp():
-            return lift(lambda value: _unary(node.operator, value, span), evaluate(run, node.operand, scope))
+            return _unary(node.operator, evaluate(run, node.operand, scope), span)
         case ast.ComparisonChain():
             return _compare_chain(run, node, scope)
         case ast.BoolOp():

@@ -44,7 +44,6 @@ from scenicq.compiler.values import (
     ScenicClass,
     describe,
     fail,
-    lift,
 )
 from scenicq.errors import Diagnostic, ScenarioError, Span
 from scenicq.forest import build
@@ -361,7 +360,7 @@ class Interpreter:
         old, new = evaluate(self, node.target, scope), evaluate(self, node.value, scope)
         if node.operator == "+" and isinstance(old, list) and not isinstance(new, list):
             new = iterate(new, node.span)
-        value = lift(lambda a, b: binary(node.operator, a, b, node.span), old, new)
+        value = binary(node.operator, old, new, node.span)
         if isinstance(old, list | set) and type(value) is type(old):
             # other names of the same list or set see the change, as in Python
             held = list(cast("list[ModelValue]", value))

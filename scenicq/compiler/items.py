@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any, cast
 
 from scenicq.compiler import operators
 from scenicq.compiler.arithmetic import hashed, is_random
-from scenicq.compiler.choices import each_existing, regions_apart
 from scenicq.compiler.coerce import kind_of_model, to_vector
 from scenicq.compiler.comparisons import compare, iterate
 from scenicq.compiler.courses import option_of
 from scenicq.compiler.known_properties import known_truth
+from scenicq.compiler.random_values import each_existing, regions_apart
 from scenicq.compiler.region_attributes import corner
 from scenicq.compiler.values import Choice, ModelValue, Module, describe, fail, is_node
 from scenicq.errors import Span

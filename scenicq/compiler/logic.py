@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING
 from scenicq.compiler import operators
 from scenicq.compiler.arithmetic import is_random
 from scenicq.compiler.builtins import truth
-from scenicq.compiler.choices import distribute, is_choice
 from scenicq.compiler.coerce import kind_of_model, to_boolean
 from scenicq.compiler.courses import as_test, split
 from scenicq.compiler.environment import Environment
 from scenicq.compiler.known_properties import known_truth
+from scenicq.compiler.random_values import is_choice, lift
 from scenicq.compiler.values import Delayed, ModelValue, fail, is_node
 from scenicq.errors import Span
 from scenicq.forest.nodes import Constant
@@ -103,7 +103,7 @@ def _deciding(run: Interpreter, op: str, values: list[ModelValue], span: Span) -
         def taken(*outcome: ModelValue) -> ModelValue:
             return _deciding(run, op, _until_decided(run, op, outcome, span), span)
 
-        return distribute(taken, tuple(left), span, spread=is_choice)
+        return lift(taken, *left, span=span, spread=is_choice)
     if run.course is not None:
         return next((value for value in left[:-1] if known_truth(run, value, span) == (op == "or")), left[-1])
     raise fail("random-branch", f"which operand `{op}` gives depends on a random value", span, "random here",

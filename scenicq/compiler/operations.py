@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from scenicq.compiler import operators
 from scenicq.compiler.attributes import PARTS, part_of
-from scenicq.compiler.choices import distribute
 from scenicq.compiler.coerce import to_vector
 from scenicq.compiler.following import follow
-from scenicq.compiler.values import Builtin, ModelValue, fail, lift
+from scenicq.compiler.random_values import holds_instances, lift
+from scenicq.compiler.values import Builtin, ModelValue, fail
 from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.syntax import ast
@@ -158,7 +158,7 @@ def _apply(run: Interpreter, operation: _Operation, operands: Sequence[ModelValu
     def now(*values: ModelValue) -> ModelValue:
         return operation.meaning(run, *values, span)
 
-    return lift(lambda *values: distribute(now, values, span) if operation.is_spread else now(*values), *operands)
+    return lift(now, *operands, span=span, spread=holds_instances if operation.is_spread else None)
 
 
 def operator_functions(run: Interpreter) -> dict[str, ModelValue]:

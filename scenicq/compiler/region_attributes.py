@@ -14,9 +14,9 @@ from typing import cast
 from shapely.geometry import LineString
 
 from scenicq.compiler import operators
-from scenicq.compiler.choices import possible_values
 from scenicq.compiler.coerce import kind_of_model, to_scalar, to_vector
 from scenicq.compiler.elements import MISSING
+from scenicq.compiler.random_values import possible_values
 from scenicq.compiler.values import Builtin, Choice, ModelValue, fail
 from scenicq.errors import Span
 from scenicq.forest import build

@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING, Any
 from scenicq.compiler import operators
 from scenicq.compiler.arithmetic import is_random, plain_binary
 from scenicq.compiler.builtins import extreme, language_names, truth
-from scenicq.compiler.choices import each_option
 from scenicq.compiler.coerce import kind_of_model, to_scalar
 from scenicq.compiler.comparisons import compare
 from scenicq.compiler.expressions import call
 from scenicq.compiler.items import components, is_vector, items_of
 from scenicq.compiler.known_properties import as_constant, known_truth
+from scenicq.compiler.random_values import each_existing, is_choice
 from scenicq.compiler.rounding import in_order
-from scenicq.compiler.values import Builtin, Choice, Function, ModelValue, fail, lift
+from scenicq.compiler.values import Builtin, Choice, Function, ModelValue, fail
 from scenicq.errors import Span
 from scenicq.forest.nodes import Constant
 
@@ -47,7 +47,7 @@ def sequence_functions(run: Interpreter) -> dict[str, ModelValue]:
 
     def filtered(span: Span, function: ModelValue, items: ModelValue) -> ModelValue:
         if isinstance(items, Choice):
-            return each_option(run, items, lambda option: filtered(span, function, option), span)
+            return each_existing(run, items, lambda option: filtered(span, function, option), span)
         return [item for item in items_of(run, items, span) if known_truth(run, apply(function, item, span), span)]
 
     def mapped(span: Span, function: ModelValue, *lists: ModelValue) -> ModelValue:
@@ -57,7 +57,7 @@ def sequence_functions(run: Interpreter) -> dict[str, ModelValue]:
     def less(one: ModelValue, other: ModelValue, span: Span) -> bool:
         run.budget.step(span)
         if is_random(one) or is_random(other):
-            return known_truth(run, lift(lambda a, b: compare("<", a, b, span), one, other), span)
+            return known_truth(run, compare("<", one, other, span), span)
         return plain_binary("<", one, other, span)
 
     def ordered(span: Span, items: ModelValue, key: ModelValue = None, reverse: ModelValue = False) -> ModelValue:
@@ -134,4 +134,4 @@ def sequence_functions(run: Interpreter) -> dict[str, ModelValue]:
         "max": extremal("max"),
         "callable": lambda span, value: isinstance(value, Function | Builtin),
     }
-    return {name: Builtin(name, function) for name, function in functions.items()}
+    return {name: Builtin(name, each, spread=is_choice if name == "len" else None) for name, each in functions.items()}

@@ -12,14 +12,14 @@ from functools import partial
 from typing import cast
 
 from scenicq.compiler import operators
-from scenicq.compiler.choices import holds_instances, make_choice
 from scenicq.compiler.coerce import kind_of_model, property_node, to_heading, to_place, to_scalar, to_vector
 from scenicq.compiler.deviations import DEVIATIONS, deviation, leaves_the_plane
 from scenicq.compiler.environment import FIRST_NAMES, Budget
 from scenicq.compiler.following import follow
 from scenicq.compiler.orientations import orientation, surely_gives_a_heading
+from scenicq.compiler.random_values import holds_instances, lift, make_choice
 from scenicq.compiler.specifiers import BoundSpecifier
-from scenicq.compiler.values import Choice, Delayed, Instance, ModelValue, fail, lift
+from scenicq.compiler.values import Choice, Delayed, Instance, ModelValue, fail
 from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.forest.compute import fold
@@ -330,7 +330,7 @@ def _bind_each(
     def chosen(instance: Instance) -> Mapping[str, ModelValue]:
         given = [option.evaluate(instance) for option in options]
         return {name: make_choice(choice.index, [each[name] for each in given], span)
-                for name in options[0].gives | optional}  # fmt: skip
+                for name in sorted(options[0].gives | optional)}  # fmt: skip
 
     needs = frozenset[str]().union(*(option.needs for option in options))
     return BoundSpecifier(options[0].gives, optional, needs, chosen, span)

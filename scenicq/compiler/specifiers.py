@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
-from scenicq.compiler.choices import make_choice
 from scenicq.compiler.coerce import to_node
+from scenicq.compiler.random_values import make_choice
 from scenicq.compiler.values import Instance, ModelValue, PropertyDefinition, ScenicClass, fail
 from scenicq.errors import Diagnostic, Note, ScenarioError, Span
 from scenicq.forest.nodes import Arithmetic, ArithmeticOp, Constant, DirectionAt, Feature, Index, Node

@@ -10,8 +10,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from scenicq.compiler.choices import NothingLeftError
 from scenicq.compiler.environment import Environment
+from scenicq.compiler.random_values import NothingLeftError
 from scenicq.compiler.values import Function, ModelValue, ScenicClass
 from scenicq.errors import ScenarioError
 from scenicq.syntax import ast

@@ -31,7 +31,6 @@ __all__ = [
     "describe",
     "fail",
     "is_node",
-    "lift",
 ]
 
 ModelValue: TypeAlias = Any
@@ -199,6 +198,7 @@ class Builtin:
         owner: What it is a method of: the call may go through all of it.
         cost: Steps that a call takes besides.
         known: Whether it takes known values only: what the program itself says of its objects counts as known.
+        spread: Which random choices among its arguments it takes each outcome of by itself; none if not given.
     """
 
     name: str
@@ -207,6 +207,7 @@ class Builtin:
     owner: ModelValue = None
     cost: int = 0
     known: bool = False
+    spread: Callable[[ModelValue], bool] | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -224,18 +225,6 @@ class Module:
     names: dict[str, ModelValue]
     dynamic: bool = False
     call: ModelValue = None
-
-
-def lift(needed: Callable[..., ModelValue], *args: ModelValue) -> ModelValue:
-    """Apply a function now, or, if an argument is delayed, as soon as the object's properties are known."""
-    delayed = [arg for arg in args if isinstance(arg, Delayed)]
-    if not delayed:
-        return needed(*args)
-    needs = frozenset[str]().union(*(arg.needs for arg in delayed))
-    return Delayed(
-        needs,
-        lambda instance: lift(needed, *(arg.evaluate(instance) if isinstance(arg, Delayed) else arg for arg in args)),
-    )
 
 
 _NAMES: dict[type, str] = {

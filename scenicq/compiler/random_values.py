@@ -1,4 +1,4 @@
-"""Random choices between values that are not expressions: objects, road elements, lists.
+"""Values that come later, or out in several ways: random choices between objects, road elements, lists.
 
 An operator whose meaning depends on what it is applied to (an object has a box, a point has none) is applied to every
 option, and the results become one random choice again.
@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, cast
 
 from scenicq.compiler.coerce import kind_of_model, to_node
-from scenicq.compiler.values import Choice, Instance, ModelValue, fail, is_node
+from scenicq.compiler.values import Choice, Delayed, Instance, ModelValue, fail, is_node
 from scenicq.errors import ScenarioError, Span
 from scenicq.forest.nodes import Constant, Identity, Node, Select, Undefined
 from scenicq.limits import LIMITS
@@ -22,13 +22,11 @@ if TYPE_CHECKING:
 __all__ = [
     "LACKING",
     "NothingLeftError",
-    "distribute",
     "each_existing",
-    "each_option",
     "holds_instances",
     "is_choice",
+    "lift",
     "make_choice",
-    "map_choice",
     "nothing_to_choose",
     "possible_values",
     "regions_apart",
@@ -70,13 +68,6 @@ def make_choice(index: Node, options: list[ModelValue], span: Span | None) -> Mo
     return Choice(index, tuple(options), size)
 
 
-def map_choice(value: ModelValue, function: Callable[[ModelValue], ModelValue], span: Span | None) -> ModelValue:
-    """Apply a function to each option of a random choice, or to a value that is none."""
-    if not isinstance(value, Choice):
-        return function(value)
-    return make_choice(value.index, [function(option) for option in value.options], span)
-
-
 def each_existing(
     run: Interpreter, choice: Choice, function: Callable[[ModelValue], ModelValue], span: Span
 ) -> ModelValue:
@@ -90,7 +81,8 @@ def each_existing(
     for number, option in enumerate(choice.options):
         try:
             with run.excluded.assuming(choice.index, number, len(choice.options)):
-                found[number] = function(option)
+                nested = isinstance(option, Choice)
+                found[number] = each_existing(run, option, function, span) if nested else function(option)
         except ScenarioError as error:
             if option is not None and error.diagnostics[0].code not in LACKING:
                 raise
@@ -104,17 +96,6 @@ def each_existing(
     run.excluded.add(choice.index, [number for number in range(count) if number not in found], count, span)
     spare = next(iter(found.values()))
     return make_choice(choice.index, [found.get(number, spare) for number in range(count)], span)
-
-
-def each_option(
-    run: Interpreter, choice: Choice, function: Callable[[ModelValue], ModelValue], span: Span
-) -> ModelValue:
-    """Apply a function that runs the program to each option; what one of them lacks excludes that option alone."""
-    options: list[ModelValue] = []
-    for number, option in enumerate(choice.options):
-        with run.excluded.assuming(choice.index, number, len(choice.options)):
-            options.append(function(option))
-    return make_choice(choice.index, options, span)
 
 
 def regions_apart(value: ModelValue) -> ModelValue:
@@ -152,36 +133,48 @@ def holds_instances(value: ModelValue) -> bool:
     return isinstance(value, Choice) and any(isinstance(each, Instance) for each in possible_values(value))
 
 
-def _check_outcomes(choices: list[Choice], span: Span) -> None:
+def lift(
+    function: Callable[..., ModelValue], *values: ModelValue, span: Span | None = None,
+    spread: Callable[[ModelValue], bool] | None = None,
+) -> ModelValue:  # fmt: skip
+    """Apply a function to values of which some are known later, or come out in several ways.
+
+    Where one waits for the properties of the object that is being made, the result does, too. The function is applied
+    to every outcome of the random choices among the values; one that occurs in several comes out the same in all.
+
+    Args:
+        function: Takes the values, with nothing that waits and no such choice among them.
+        values: The values.
+        span: The construct.
+        spread: Which values to take apart; none if not given.
+    """
+    if any(isinstance(value, Delayed) for value in values):
+        needs = frozenset[str]().union(*(value.needs for value in values if isinstance(value, Delayed)))
+
+        def later(instance: Instance) -> ModelValue:
+            known = (value.evaluate(instance) if isinstance(value, Delayed) else value for value in values)
+            return lift(function, *known, span=span, spread=spread)
+
+        return Delayed(needs, later)
+    choices = [value for value in values if isinstance(value, Choice) and spread and spread(value)]
+    if not choices:
+        return function(*values)
     outcomes = math.prod({choice.key: len(choice.options) for choice in choices}.values())
     if outcomes > LIMITS.choice_options:
         what = f"this has more than {LIMITS.choice_options:,} outcomes"
         raise fail("budget-exceeded", what, span, "of random choices",
                    ("choose between fewer", "compare numbers that are made from the choices"))  # fmt: skip
+    return _each_outcome(function, values, span, {}, spread or is_choice)
 
 
-def distribute(
+def _each_outcome(
     function: Callable[..., ModelValue],
     values: tuple[ModelValue, ...],
-    span: Span,
-    picked: Mapping[Identity | int, int] | None = None,
-    *,
-    spread: Callable[[ModelValue], bool] = holds_instances,
+    span: Span | None,
+    picked: Mapping[Identity | int, int],
+    spread: Callable[[ModelValue], bool],
 ) -> ModelValue:
-    """Apply a function to every outcome of the random choices among its arguments.
-
-    One choice that occurs in several arguments comes out the same in all of them.
-
-    Args:
-        function: Takes the values, with no such choice among them.
-        values: The arguments.
-        span: The construct.
-        picked: Options that are already settled.
-        spread: Which arguments to take apart; choices of objects if not given.
-    """
-    if picked is None:
-        picked = {}
-        _check_outcomes([cast(Choice, value) for value in values if spread(value)], span)
+    """The function of values of which some choices are picked already, by key."""
     for number, value in enumerate(values):
         if not spread(value):
             continue
@@ -191,9 +184,9 @@ def distribute(
             return (*values[:number], choice.options[option], *values[number + 1 :])
 
         if choice.key in picked:
-            return distribute(function, given(picked[choice.key]), span, picked, spread=spread)
+            return _each_outcome(function, given(picked[choice.key]), span, picked, spread)
         results = [
-            distribute(function, given(option), span, {**picked, choice.key: option}, spread=spread)
+            _each_outcome(function, given(option), span, {**picked, choice.key: option}, spread)
             for option in range(len(choice.options))
         ]
         return make_choice(choice.index, results, span)
