@@ -1,9 +1,5 @@
 """What gets a value: names, items, several names at once, the names of comprehensions."""
 
-# Programs are dynamically typed: their values are `Any`, and so is what lambdas take.
-# pyright: reportUnknownLambdaType=false, reportUnknownArgumentType=false, reportUnknownVariableType=false
-# pyright: reportUnknownParameterType=false, reportUnknownMemberType=false
-
 from __future__ import annotations
 
 from collections.abc import Callable

@@ -1,9 +1,5 @@
 """Reading a value as what an operator needs: a scalar, a heading, a vector, a region (language paper, table 1)."""
 
-# Programs are dynamically typed: their values are `Any`, and so is what lambdas take.
-# pyright: reportUnknownLambdaType=false, reportUnknownArgumentType=false, reportUnknownVariableType=false
-# pyright: reportUnknownParameterType=false, reportUnknownMemberType=false
-
 from __future__ import annotations
 
 import math

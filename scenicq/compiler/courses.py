@@ -5,9 +5,6 @@ later on. So the condition is evaluated once for each course that it may take, a
 values. What one course lacks excludes the scenes that take it.
 """
 
-# Programs are dynamically typed: their values are `Any`.
-# pyright: reportUnknownArgumentType=false, reportUnknownVariableType=false, reportUnknownMemberType=false
-
 from __future__ import annotations
 
 from collections.abc import Callable, Generator

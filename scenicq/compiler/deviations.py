@@ -1,8 +1,5 @@
 """Properties that Scenic 3 spells with one number an axis: the noise that `mutate` adds, and angles of view."""
 
-# Programs are dynamically typed: their values are `Any`, and so is what lambdas take.
-# pyright: reportUnknownArgumentType=false, reportUnknownVariableType=false
-
 from __future__ import annotations
 
 from collections.abc import Sequence

@@ -1,8 +1,5 @@
 """The elements of the map as look-ups give them: which there are, where each counts, and which one lies at a place."""
 
-# Programs are dynamically typed: their values are `Any`, and so is what lambdas take.
-# pyright: reportUnknownLambdaType=false
-
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence

@@ -1,9 +1,5 @@
 """`and`, `or`, `not`: as conditions, of which only the truth counts, and as the values that Python makes of them."""
 
-# Programs are dynamically typed: their values are `Any`, and so is what lambdas take.
-# pyright: reportUnknownLambdaType=false, reportUnknownArgumentType=false, reportUnknownVariableType=false
-# pyright: reportUnknownParameterType=false, reportUnknownMemberType=false
-
 from __future__ import annotations
 
 from collections.abc import Iterable

@@ -6,10 +6,6 @@ choices. Where elements of one kind overlap, any of them may be meant; which one
 their sections, groups and roads together.
 """
 
-# Programs are dynamically typed: their values are `Any`, and so is what lambdas take.
-# pyright: reportUnknownLambdaType=false, reportUnknownArgumentType=false, reportUnknownVariableType=false
-# pyright: reportUnknownParameterType=false, reportUnknownMemberType=false
-
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence

@@ -3,10 +3,6 @@
 Programs may also call operators as functions, by the names that Scenic's compiler gives them.
 """
 
-# Programs are dynamically typed: their values are `Any`, and so is what lambdas take.
-# pyright: reportUnknownLambdaType=false, reportUnknownArgumentType=false, reportUnknownVariableType=false
-# pyright: reportUnknownParameterType=false, reportUnknownMemberType=false
-
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence

@@ -1,9 +1,5 @@
 """What a program may read of regions: methods of any region, and parts of known ones."""
 
-# Programs are dynamically typed: their values are `Any`, and so is what lambdas take.
-# pyright: reportUnknownLambdaType=false, reportUnknownArgumentType=false, reportUnknownVariableType=false
-# pyright: reportUnknownParameterType=false, reportUnknownMemberType=false
-
 from __future__ import annotations
 
 import math

@@ -4,10 +4,6 @@ A lane group's curb, sidewalk and shoulder are those along its right edge; the c
 those that reach into it. What depends on facts that no map of a dataset holds is an error that says so.
 """
 
-# Programs are dynamically typed: their values are `Any`, and so is what lambdas take.
-# pyright: reportUnknownLambdaType=false, reportUnknownArgumentType=false, reportUnknownVariableType=false
-# pyright: reportUnknownParameterType=false, reportUnknownMemberType=false
-
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence

@@ -1,9 +1,5 @@
 """Functions over lists that call back into the program: `filter`, `map`, `sorted`, `any`, `all`, `min`, `max`."""
 
-# Programs are dynamically typed: their values are `Any`, and so is what lambdas take.
-# pyright: reportUnknownLambdaType=false, reportUnknownArgumentType=false, reportUnknownVariableType=false
-# pyright: reportUnknownParameterType=false, reportUnknownMemberType=false
-
 from __future__ import annotations
 
 from collections.abc import Callable

@@ -4,10 +4,6 @@ A value is a plain Python value (number, string, list, function ...), a forest n
 region), or one of the classes below. Nothing here evaluates syntax.
 """
 
-# Programs are dynamically typed: their values are `Any`, and so is what lambdas take.
-# pyright: reportUnknownLambdaType=false, reportUnknownArgumentType=false, reportUnknownVariableType=false
-# pyright: reportUnknownParameterType=false, reportUnknownMemberType=false
-
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping

@@ -3,10 +3,6 @@
 pyarrow has all of this, but loads `pyarrow.compute` and `numpy.ma` for it: more time than a small ingest takes.
 """
 
-# pyarrow has no type stubs.
-# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
-# pyright: reportUnknownArgumentType=false
-
 from __future__ import annotations
 
 from collections.abc import Sequence

@@ -1,9 +1,5 @@
 """The cameras of the table `sensors`: rows of them, cameras of rows, and what cameras cannot be."""
 
-# pyarrow has no type stubs.
-# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
-# pyright: reportUnknownArgumentType=false
-
 from __future__ import annotations
 
 from collections.abc import Sequence

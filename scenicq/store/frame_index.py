@@ -3,10 +3,6 @@
 Names of frames are often random, so no order of the labels helps to find one; this table does, by its statistics.
 """
 
-# pyarrow has no type stubs.
-# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
-# pyright: reportUnknownArgumentType=false
-
 from __future__ import annotations
 
 import hashlib

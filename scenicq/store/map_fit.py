@@ -4,9 +4,6 @@ Vehicles lie on lanes, those that move head along them, a left neighbour lies on
 are, and labels lie where the map is. A map that is mirrored, turned, in degrees or elsewhere misses one of these.
 """
 
-# Shapely's types say too little of arrays.
-# pyright: reportUnknownMemberType=false, reportUnknownVariableType=false, reportUnknownArgumentType=false
-
 from __future__ import annotations
 
 import math

@@ -1,8 +1,5 @@
 """What a map says about positions: regions around them, lane, direction of the road. Computed once, at ingest."""
 
-# shapely does not say what its arrays hold.
-# pyright: reportUnknownArgumentType=false
-
 from __future__ import annotations
 
 from collections.abc import Sequence

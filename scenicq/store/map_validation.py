@@ -1,9 +1,5 @@
 """Maps of a dataset looked at as data: shapes that a geometry library can take, and properties that can be read."""
 
-# pyarrow has no type stubs.
-# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
-# pyright: reportUnknownArgumentType=false
-
 from __future__ import annotations
 
 from collections.abc import Mapping

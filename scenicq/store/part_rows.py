@@ -1,8 +1,7 @@
 """The rows of one file of a table in order, read forwards in batches, so that memory does not grow with the file."""
 
 # pyarrow has no type stubs.
-# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
-# pyright: reportUnknownArgumentType=false, reportAttributeAccessIssue=false
+# pyright: reportAttributeAccessIssue=false
 
 from __future__ import annotations
 

@@ -4,9 +4,6 @@ Everything that reads a dataset reads through here, and only files of the datase
 may be a stranger's.
 """
 
-# pyarrow has no type stubs.
-# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
-
 from __future__ import annotations
 
 import hashlib

@@ -4,10 +4,6 @@ Parts of one number hold the same recordings, and each row of `labels` says wher
 reading needs no join, and of chosen frames only the row groups that hold them are read.
 """
 
-# pyarrow has no type stubs.
-# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
-# pyright: reportUnknownArgumentType=false
-
 from __future__ import annotations
 
 import json

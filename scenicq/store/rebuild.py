@@ -4,10 +4,6 @@ Labels, objects, sensors and maps stay as they are; lanes, directions, membershi
 counts come from them. The result is byte for byte that of an ingest.
 """
 
-# pyarrow has no type stubs.
-# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
-# pyright: reportUnknownArgumentType=false
-
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator

@@ -1,9 +1,5 @@
 """Maps as rows: `regions` (everything) and `lanes` (for queries), and back."""
 
-# pyarrow has no type stubs.
-# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
-# pyright: reportUnknownArgumentType=false
-
 from __future__ import annotations
 
 import json

@@ -1,9 +1,5 @@
 """Columns of some rows of a Parquet file, read group by group, so that memory depends on those rows."""
 
-# pyarrow has no type stubs.
-# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
-# pyright: reportUnknownArgumentType=false
-
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence

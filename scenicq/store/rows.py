@@ -1,9 +1,5 @@
 """From the columns of one recording to rows of every table, with what is computed at ingest."""
 
-# pyarrow has no type stubs.
-# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
-# pyright: reportUnknownArgumentType=false
-
 from __future__ import annotations
 
 from collections import Counter

@@ -4,10 +4,6 @@ To DuckDB a path is language: it takes `NAME=VALUE` in the name of any folder fo
 patterns. Folders have the names that users choose, so a scan reads just its files, and just the columns of the schema.
 """
 
-# pyarrow has no type stubs.
-# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
-# pyright: reportUnknownArgumentType=false
-
 from __future__ import annotations
 
 import re

@@ -7,10 +7,6 @@ objects of one frame lie together and in the order of the labels. Columns marked
 These four tables are split into parts of whole recordings; parts of one number hold the same recordings.
 """
 
-# pyarrow has no type stubs.
-# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
-# pyright: reportUnknownArgumentType=false
-
 from __future__ import annotations
 
 import json

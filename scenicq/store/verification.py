@@ -1,9 +1,5 @@
 """What is computed at ingest computed again and compared: the prefilter believes it, and a stranger may have lied."""
 
-# pyarrow has no type stubs.
-# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
-# pyright: reportUnknownArgumentType=false
-
 from __future__ import annotations
 
 from collections.abc import Mapping

@@ -3,10 +3,6 @@
 The same recordings and maps give byte-identical files but for the manifest's `provenance`.
 """
 
-# pyarrow has no type stubs.
-# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
-# pyright: reportUnknownArgumentType=false
-
 from __future__ import annotations
 
 from collections import Counter
