@@ -44,8 +44,10 @@ def advise(query: Query, *, asked: bool, near: bool = False) -> None:
     """
     from scenicq.query.explain.advice import advice  # noqa: PLC0415 - takes long to load
 
-    found = advice(query, budget_s=math.inf if asked else _BUDGET_S, brief=not asked)
     funnel = query.funnel
+    # labels that had all their time have none left for what nobody asked for
+    budget_s = math.inf if asked else 0.0 if funnel.reasons["timeout"] else _BUDGET_S
+    found = advice(query, budget_s=budget_s, brief=not asked)
     lines = [f"{count(funnel.matches, 'match')} in {count(funnel.frames, 'frame')}"]
     if funnel.unknowns:
         lines[0] += f", {funnel.unknowns:,} unknown"

@@ -24,6 +24,7 @@ from scenicq.query.explain import prefilter_counts
 from scenicq.query.explain.advice import advice
 from scenicq.smt.solver import NoAnswer
 from scenicq.store.dataset import open_dataset
+from scenicq_cli.advise import advise
 
 SAMPLES = Path(__file__).parents[3] / "sample_data"
 TEXT = """model scenic.domains.driving.model
@@ -162,6 +163,21 @@ def test_what_takes_all_time_has_no_more_than_the_budget(until_s, dataset, monke
     assert not found.complete
     # what nobody decided may match
     assert all(outlook.least < outlook.most for outlook in found.outlooks)
+
+
+def test_labels_that_had_all_their_time_have_none_left_for_advice(dataset, monkeypatch, capsys):
+    text = (
+        "model scenic.domains.driving.model\nego = new Car\nother = new Car\nrequire (distance to other) < 1\nmutate\n"
+    )
+    solver = _Hanging(monkeypatch)
+    query = taken(dataset, text, timeout_s=3.0, method="smt")
+    before_s = solver.now_s
+    assert query.funnel.reasons["timeout"] * 3.0 == pytest.approx(before_s)
+    advise(query, asked=False)
+    assert solver.now_s == before_s
+    assert "with one change there would be" in capsys.readouterr().err
+    advise(query, asked=True)
+    assert solver.now_s > before_s
 
 
 def test_the_command_advises_where_nothing_matches_and_when_asked(run, crossroads, scenarios, tmp_path):
