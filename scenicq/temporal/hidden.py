@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +18,7 @@ from scenicq.forest.nodes import (
     Arithmetic,
     ArithmeticOp,
     Compare,
+    CompareOp,
     Constant,
     Coordinate,
     DiscreteRange,
@@ -23,6 +26,7 @@ from scenicq.forest.nodes import (
     Index,
     Leaf,
     Logic,
+    LogicOp,
     Node,
     Normal,
     Range,
@@ -32,10 +36,10 @@ from scenicq.forest.nodes import (
     VectorOf,
     VectorSum,
 )
-from scenicq.forest.walk import children, leaves, postorder
+from scenicq.forest.walk import children, leaves, postorder, transform
 from scenicq.temporal.atoms import AtomColumns, UnclearVariable
 
-__all__ = ["affine_sides", "comparisons_of", "has_cuts", "inside", "random_variables", "support"]
+__all__ = ["affine_sides", "comparisons_of", "has_cuts", "inside", "possibly", "random_variables", "support"]
 
 
 def random_variables(conditions: Iterable[Node]) -> list[Leaf]:
@@ -134,6 +138,41 @@ def has_cuts(condition: Node) -> bool:
         for leaf, comparisons in found
         for each in comparisons
     )
+
+
+def possibly(condition: Node) -> Node | None:
+    """What holds wherever a condition does for some values of random variables; None if that is not known.
+
+    A comparison that is affine in a bounded number holds for some value of it if it does for the least or the greatest.
+    """
+    known: dict[int, Node] = {}
+    for node in postorder((condition,)):
+        own = leaves(node)
+        if not own:
+            continue
+        match node:
+            case Logic(op=LogicOp.AND | LogicOp.OR as op, args=args):
+                parts = [known.get(id(each), None if leaves(each) else each) for each in args]
+                some = tuple(each for each in parts if each is not None)
+                if some and (op is LogicOp.AND or len(some) == len(parts)):
+                    known[id(node)] = replace(node, args=some)
+            case Compare(op=CompareOp.LT | CompareOp.LE | CompareOp.GT | CompareOp.GE) if has_cuts(node):
+                with suppress(UnclearVariable):
+                    ends = support(own[0])
+                    if all(map(math.isfinite, ends)):
+                        known[id(node)] = Logic(LogicOp.OR, tuple(_with(node, own[0], end) for end in ends))
+            case _:
+                pass
+    return known.get(id(condition), None if leaves(condition) else condition)
+
+
+def _with(node: Node, leaf: Leaf, value: float) -> Node:
+    """An expression with a value of a random variable."""
+
+    def valued(each: Node) -> Node:
+        return Constant(value) if getattr(each, "identity", None) is leaf.identity else each
+
+    return transform(node, valued)
 
 
 def affine_sides(

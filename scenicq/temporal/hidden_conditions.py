@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -148,6 +149,29 @@ class HiddenConditions:
             mine = pattern == each
             found[mine] = self._column(number, each)[places][mine]
         return found
+
+    def possible(self, number: int) -> tuple[int, Numbers, Numbers] | None:
+        """The variable of a condition, and between which values of it the condition may hold at each place.
+
+        Both ends are included; the lower one is above the other where there are none. None where it hangs on several.
+
+        Args:
+            number: The condition's number.
+        """
+        cuts = sorted(self.of[number])
+        variables = {self.cuts[cut].variable for cut in cuts}
+        if len(variables) > 1 or len(cuts) > LIMITS.jump_cuts:
+            return None
+        places = [self.cuts[cut].at for cut in cuts]
+        infinite = np.full(len(places[0]), np.inf)
+        ends = [-infinite, *np.sort(np.stack(places), axis=0), infinite]
+        low, high = infinite.copy(), -infinite
+        for lower, upper in pairwise(ends):
+            sides = {cut: at <= lower for cut, at in zip(cuts, places, strict=True)}
+            holds = (self.truth(number, slice(None), sides) > FALSE) & (lower < upper)
+            low = np.where(holds, np.minimum(low, lower), low)
+            high = np.where(holds, np.where(upper == np.inf, np.inf, np.nextafter(upper, -np.inf)), high)
+        return variables.pop(), low, high
 
     def _column(self, number: int, pattern: int) -> Truth:
         """The value of a condition at all places, with its cuts' sides as bits."""

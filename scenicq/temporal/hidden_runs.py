@@ -22,6 +22,7 @@ from scenicq.match.verdict import Match, Unknown, WitnessValue
 from scenicq.smt.answer import Solver
 from scenicq.temporal.atoms import AtomColumns, UnclearVariable
 from scenicq.temporal.hidden import inside
+from scenicq.temporal.hidden_bounds import PossibleValues
 from scenicq.temporal.hidden_conditions import HiddenConditions
 from scenicq.temporal.hidden_examples import ExampleOutcome, Examples, Remembered, examine_start
 from scenicq.temporal.outcomes import place_of
@@ -34,6 +35,7 @@ from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 __all__ = ["Detail", "HiddenFound", "HiddenRuns", "Remembered"]
 
 _Rest = TypeVarTuple("_Rest")
+Numbers = NDArray[np.float64]
 Detail = tuple[str, Mapping[str, WitnessValue]]
 """Why a run is unknown, and the values of random variables of conditions over time."""
 
@@ -69,12 +71,18 @@ class HiddenFound:
         self.runs.put(start, found[0][0])
         self.others.extend((start, run.end, run.truth) for run, _ in found[1:])
 
-    def add(self, found: HiddenFound, start: int, place: int) -> None:
-        """Write down what became of some starts that follow each other, of which `start` and `place` are the first."""
-        found.runs.ends[:] += place
-        self.runs.replace(np.arange(start, start + len(found.runs.ends)), found.runs)
-        self.others.extend((start + number, place + end, truth) for number, end, truth in found.others)
-        self.details.update({(number, place + end): detail for (number, end), detail in found.details.items()})
+    def add(self, found: HiddenFound, starts: NDArray[np.int64], places: NDArray[np.int64]) -> None:
+        """Write down what became of some starts.
+
+        Args:
+            found: What became of them.
+            starts: Their numbers among all.
+            places: The places that it is about.
+        """
+        found.runs.ends[:] = places[found.runs.ends]
+        self.runs.replace(starts, found.runs)
+        self.others.extend((int(starts[number]), int(places[end]), truth) for number, end, truth in found.others)
+        self.details.update({(number, int(places[end])): detail for (number, end), detail in found.details.items()})
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -86,12 +94,14 @@ class HiddenRuns:
         scenario: The scenario.
         match: Options of the matcher.
         solver: Decides what is not decided otherwise.
+        reasons: Whether somebody reads what runs fail at.
     """
 
     machine: RunMachine
     scenario: Scenario
     match: MatchOptions
     solver: Solver | None
+    reasons: bool = True
 
     def follow(
         self, stretches: Stretches, columns: AtomColumns, expanded: Sequence[Node],
@@ -113,9 +123,10 @@ class HiddenRuns:
         # what is unclear of one stretch is not so of all
         found = HiddenFound(Runs.unknown(stretches.ends()))
         for places, mine in stretches.apart():
-            one = stretches.some(np.arange(int(places.start), int(places.stop), dtype=np.int64))
+            whole = np.arange(int(places.start), int(places.stop), dtype=np.int64)
+            one = stretches.some(whole)
             own = self._of_stretch(one, AtomColumns(self.scenario, one.places, start=one.heads()), expanded, remember)
-            found.add(own, int(mine.start), int(places.start))
+            found.add(own, np.arange(int(mine.start), int(mine.stop)), whole)
         return found
 
     def _of_stretch(
@@ -145,7 +156,27 @@ class HiddenRuns:
     ) -> HiddenFound:  # fmt: skip
         """The runs by the values of hidden numbers."""
         hidden = HiddenConditions(columns, expanded)
-        pieces = follow_pieces(self.machine, stretches, columns.reader(expanded), hidden)
+        if self.reasons:
+            return self._within(stretches, columns, expanded, remember, hidden, None)
+        possible = PossibleValues.of(self.machine, stretches, columns.reader(expanded), hidden)
+        which = possible.any
+        if which.all():
+            return self._within(stretches, columns, expanded, remember, hidden, (possible.low, possible.high))
+        found = HiddenFound(Runs.lost(stretches.starts.copy()))
+        if which.any():
+            some, chosen = stretches.only(which)
+            own = AtomColumns(self.scenario, some.places, start=some.heads())
+            limits = possible.low[which], possible.high[which]
+            part = self._within(some, own, expanded, remember, HiddenConditions(own, expanded), limits)
+            found.add(part, np.flatnonzero(which), chosen)
+        return found
+
+    def _within(
+        self, stretches: Stretches, columns: AtomColumns, expanded: Sequence[Node],
+        remember: Callable[[int], Remembered], hidden: HiddenConditions, possible: tuple[Numbers, Numbers] | None,
+    ) -> HiddenFound:  # fmt: skip
+        """The runs by those values of hidden numbers with which they may match, or by all."""
+        pieces = follow_pieces(self.machine, stretches, columns.reader(expanded), hidden, possible)
         self._confirm(pieces, stretches, columns, expanded, hidden)
         runs, numbers = pieces.runs, cast("list[int]", stretches.numbers.tolist())
         order = np.lexsort((*pieces.low.T[::-1], -runs.ends, -runs.truth.astype(np.int64), pieces.of))

@@ -143,6 +143,7 @@ class IntervalMatcher:
         match: Options of the matcher, for initial scenes.
         options: The options of intervals.
         solver: Decides what is not decided otherwise.
+        reasons: Whether somebody reads what bindings fail at.
         outcomes: The outcomes of the choices that conditions over time hang on.
     """
 
@@ -150,6 +151,7 @@ class IntervalMatcher:
     match: MatchOptions
     options: IntervalOptions
     solver: Solver | None = None
+    reasons: bool = True
     outcomes: tuple[Outcome, ...] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -204,7 +206,7 @@ class IntervalMatcher:
     ) -> _Found:  # fmt: skip
         assert program.machine is not None
         if random_variables(expanded):
-            hidden = HiddenRuns(program.machine, program.scenario, self.match, self.solver)
+            hidden = HiddenRuns(program.machine, program.scenario, self.match, self.solver, self.reasons)
             return _found(stretches, table, columns, hidden.follow(stretches, columns, expanded, remember))
         runs = follow_runs(program.machine, stretches, columns.reader(expanded))
         return _found(stretches, table, columns, HiddenFound(runs))

@@ -5,7 +5,7 @@ Where nobody reads what runs fail at, a track that does not meet them plays no r
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -28,12 +28,13 @@ from scenicq.forest.nodes import (
     VectorSum,
 )
 from scenicq.forest.scenario import Scenario
-from scenicq.forest.temporal import Always, And, Atom, Eventually, Formula, Next, Until
-from scenicq.forest.temporal import Terminate as TerminateStep
+from scenicq.forest.temporal import Atom
 from scenicq.forest.walk import features, postorder
 from scenicq.store.track_block import TrackBlock
 from scenicq.temporal.atoms import AtomColumns, reads_start
 from scenicq.temporal.first_exits import next_at
+from scenicq.temporal.hidden import possibly
+from scenicq.temporal.required import Required
 from scenicq.temporal.runs import SLACK_S
 from scenicq.temporal.samples import MOVING, BoundSamples
 from scenicq.temporal.starts import RoleCandidates, narrowed
@@ -69,20 +70,20 @@ class NecessaryConditions:
         dynamics = self.scenario.dynamics
         if dynamics is None:
             return
-        at_start, later = _read(each.formula for each in dynamics.requirements)
-        ends = [each.condition for each in dynamics.terminations]
-        self.within_s = min((each.after_s for each in dynamics.terminations if each.after_s is not None), default=None)
-        monitored = any(isinstance(step, TerminateStep) for each in dynamics.monitors for step in each.steps)
-        some: list[tuple[Atom, ...]] = [(atom,) for atom in later]
-        if ends and not monitored and self.within_s is None:
-            some.append(tuple(each for each in ends if each is not None))
-        for atom in at_start:
-            if (role := self._role([dynamics.conditions[atom.number]])) is not None:
-                self.at_start.setdefault(role, []).append(dynamics.conditions[atom.number])
+        required = Required.of(dynamics)
+        self.within_s = required.within_s
+        some: list[tuple[Atom, ...]] = [(atom,) for atom in required.later]
+        if required.ends and self.within_s is None:
+            some.append(required.ends)
+        conditions = [possibly(each) for each in dynamics.conditions]
+        for atom in (*required.at_start, *required.always):
+            condition = conditions[atom.number]
+            if condition is not None and (role := self._role([condition])) is not None:
+                self.at_start.setdefault(role, []).append(condition)
         for atoms in some:
-            conditions = tuple(dynamics.conditions[atom.number] for atom in atoms)
-            if (role := self._role(conditions)) is not None:
-                self.later.setdefault(role, []).append(conditions)
+            mine = tuple(each for atom in atoms if (each := conditions[atom.number]) is not None)
+            if len(mine) == len(atoms) and (role := self._role(mine)) is not None:
+                self.later.setdefault(role, []).append(mine)
 
     def _role(self, conditions: Sequence[Node]) -> int | None:
         """The one object beside the ego that conditions are about, if each sample by itself says whether they hold."""
@@ -197,26 +198,3 @@ def _labels_after(block: TrackBlock, labels: Members, time_s: float) -> Members:
     time = block.times_us - block.times_us.min(initial=0) + block.recording_of * whole
     wanted = time[labels] + round(min(time_s, 1e6) * 1e6) - round(SLACK_S * 1e6)
     return np.append(known, len(block))[np.searchsorted(time[known], wanted)]
-
-
-def _read(formulas: Iterable[Formula]) -> tuple[list[Atom], list[Atom]]:
-    """The atoms that hold at the first sample wherever some formulas do, and those that hold at some sample."""
-    at_start: list[Atom] = []
-    later: list[Atom] = []
-    stack = [(each, True) for each in formulas]
-    while stack:
-        formula, now = stack.pop()
-        match formula:
-            case Atom():
-                (at_start if now else later).append(formula)
-            case Always():
-                stack.append((formula.operand, now))
-            case And():
-                stack += [(each, now) for each in formula.operands]
-            case Eventually() | Next():
-                stack.append((formula.operand, False))
-            case Until():
-                stack.append((formula.right, False))
-            case _:
-                pass
-    return at_start, later

@@ -72,8 +72,9 @@ def follow_runs(
 
 
 def follow_pieces(
-    machine: RunMachine, stretches: Stretches, atom: Callable[[Atom], Truth], hidden: HiddenConditions
-) -> Pieces:
+    machine: RunMachine, stretches: Stretches, atom: Callable[[Atom], Truth], hidden: HiddenConditions,
+    possible: tuple[Numbers, Numbers] | None = None,
+) -> Pieces:  # fmt: skip
     """What becomes of the runs from all starts, by the values of hidden numbers.
 
     Args:
@@ -81,9 +82,11 @@ def follow_pieces(
         stretches: Stretches with their starts.
         atom: The value of an atom that hangs on no hidden number at each place.
         hidden: The conditions that do.
+        possible: Between which values of each variable each run may match, shape (starts, variables); other values are
+            not followed, nor runs that are lost. None where somebody reads what they fail at.
     """
     starts = _at_once(machine, len(stretches.starts))
-    parts = [_pieces(RunSteps(machine, stretches, atom, which, hidden)) for which in starts]
+    parts = [_pieces(RunSteps(machine, stretches, atom, which, hidden), possible) for which in starts]
     return Pieces(
         np.concatenate([each.of for each in parts]), Runs.joined([each.runs for each in parts]),
         np.concatenate([each.low for each in parts]), np.concatenate([each.high for each in parts]),
@@ -172,9 +175,10 @@ def _alone(steps: RunSteps) -> Notes:
     return found
 
 
-def _pieces(steps: RunSteps) -> Pieces:
+def _pieces(steps: RunSteps, possible: tuple[Numbers, Numbers] | None) -> Pieces:
     """What became of the pieces of all runs."""
-    owner, ahead = np.arange(len(steps.which)), steps.first()
+    within = () if possible is None else (possible[0][steps.which], possible[1][steps.which])
+    owner, ahead = np.arange(len(steps.which)), steps.first(*within)
     notes = Notes.nothing(len(owner))
     stops = steps.exits(ahead)
     over: list[tuple[NDArray[np.int64], Notes, Ahead]] = []
@@ -203,6 +207,15 @@ def _pieces(steps: RunSteps) -> Pieces:
         notes = Notes.joined([each[1] for each in parts])
         ahead = Ahead.joined([each[2] for each in parts])
         ended = ahead.situation < 0
+        if possible is not None:
+            # a run that has not ended and is lost is no match
+            lost = (
+                np.array([each.is_lost for each in steps.machine.situations])[ahead.situation]
+                & (notes.sure < 0)
+                & ~ended
+            )
+            notes.failed[lost] = ahead.at[lost] - 1
+            ended |= lost
         over.append((owner[ended], notes.some(ended), ahead.some(ended)))
         owner, notes, ahead = _merged(owner[~ended], notes.some(~ended), ahead.some(~ended))
         many = np.bincount(owner, minlength=len(steps.which))[owner] > LIMITS.run_pieces

@@ -27,7 +27,7 @@ from scenicq.temporal.runs import SLACK_S
 from scenicq.temporal.stretches import Stretches
 from scenicq.temporal.truth import FALSE, TRUE, Truth
 
-__all__ = ["Ahead", "LaneStep", "RunSteps"]
+__all__ = ["Ahead", "LaneStep", "RunSteps", "times_out"]
 
 Places = NDArray[np.int64]
 Numbers = NDArray[np.float64]
@@ -112,7 +112,7 @@ class RunSteps:
             (e.after_s for e in self.machine.dynamics.terminations if e.after_s is not None), default=math.inf
         )
         self.limited = math.isfinite(after_s)
-        self.due = _times_out(stretches, after_s)[which]
+        self.due = times_out(stretches, after_s)[which]
         self._of = {} if self.hidden is None else self.hidden.of
         known = [number for number in self.machine.atoms if number not in self._of]
         code = np.zeros(len(stretches.labels), np.int64)
@@ -126,14 +126,17 @@ class RunSteps:
 
     # --- one step
 
-    def first(self) -> Ahead:
-        """The lanes as they begin."""
+    def first(self, low: Numbers | None = None, high: Numbers | None = None) -> Ahead:
+        """The lanes as they begin.
+
+        Args:
+            low: The least values of hidden numbers, shape (starts, variables); of all that they have if not given.
+            high: The greatest ones.
+        """
         m = len(self.which)
-        low, high = (
-            (np.empty((m, 0)),) * 2
-            if self.hidden is None
-            else (np.tile(self.hidden.low, (m, 1)), np.tile(self.hidden.high, (m, 1)))
-        )
+        if low is None or high is None:
+            ends = (np.empty(0),) * 2 if self.hidden is None else (self.hidden.low, self.hidden.high)
+            low, high = (np.tile(each, (m, 1)) for each in ends)
         return Ahead(np.zeros(m, np.int64), self.starts.copy(), self.due, self.last, low, high)
 
     def exits(self, ahead: Ahead) -> Places:
@@ -343,7 +346,7 @@ def _at(sides: dict[int, NDArray[np.bool_]], which: NDArray[np.int64]) -> dict[i
     return {cut: each[which] for cut, each in sides.items()}
 
 
-def _times_out(stretches: Stretches, after_s: float) -> Places:
+def times_out(stretches: Stretches, after_s: float) -> Places:
     """For each start the first place at which so many seconds are over, the end of its stretch if there is none."""
     last = stretches.ends()
     if not math.isfinite(after_s):

@@ -104,6 +104,14 @@ class Stretches:
             self.numbers[mine],
         )
 
+    def only(self, which: NDArray[np.bool_]) -> tuple[Stretches, NDArray[np.int64]]:
+        """The stretches of some starts with these alone, and which places they have."""
+        mine = replace(self, starts=self.starts[which], numbers=self.numbers[which])
+        wanted = np.zeros(len(self.bounds) - 1, np.bool_)
+        wanted[np.searchsorted(self.bounds, mine.starts, side="right") - 1] = True
+        chosen = np.flatnonzero(np.repeat(wanted, np.diff(self.bounds)))
+        return mine.some(chosen), chosen
+
     def beginning(self, number: int) -> Stretches:
         """The stretches with one start alone."""
         return replace(self, starts=self.starts[number : number + 1], numbers=self.numbers[number : number + 1])

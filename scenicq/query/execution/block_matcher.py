@@ -242,7 +242,7 @@ class Decider:
             from scenicq.query.execution.recording_matcher import RecordingMatcher  # noqa: PLC0415
             from scenicq.temporal.intervals import IntervalMatcher  # noqa: PLC0415
 
-            intervals = IntervalMatcher(compiled.scenario, self.options, self.time, self._solver)
+            intervals = IntervalMatcher(compiled.scenario, self.options, self.time, self._solver, self.reasons)
             matcher = self._matcher(compiled)
             self._over_time[name] = RecordingMatcher(
                 self.dataset, matcher, intervals, self.every, self.proofs, self.reasons
