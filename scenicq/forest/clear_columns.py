@@ -30,7 +30,7 @@ __all__ = ["ClearColumns", "QuickColumns", "quick_form"]
 
 _CLOSE = 1e-9
 """How close numbers are, beside their size, that another order of operations may turn round."""
-_MOST_TIMES = 1e3
+_OFF_BY = 1e3
 """How many times what is off by rounding may be multiplied or added to itself."""
 _SMOOTH = frozenset({
     ArithmeticOp.ADD, ArithmeticOp.SUB, ArithmeticOp.NEG, ArithmeticOp.ABS, ArithmeticOp.MIN, ArithmeticOp.MAX,
@@ -116,7 +116,7 @@ def quick_form(root: Node, ego: int) -> Node | None:
             times[id(node)] = 1.0
         elif isinstance(node, Bearing) or any(id(each) in times for each in children(node)):
             times[id(node)] = _times(node, times)
-            if times[id(node)] > _MOST_TIMES:
+            if times[id(node)] > _OFF_BY:
                 return None
     return quick
 
