@@ -16,7 +16,7 @@ import pyarrow.parquet as pq
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.importers.fields import LONGEST_TEXT
-from scenicq.store.unpacked import Bound, check_claims, decoded_bytes, feather_batches, text_columns
+from scenicq.store.unpacked import RECORD_BYTES, Bound, check_claims, decoded_bytes, feather_batches, text_columns
 
 __all__ = ["read_feather", "read_parquet"]
 
@@ -45,6 +45,7 @@ def read_feather(
         bound = Bound(path)
         schema, batches = feather_batches(path.read_bytes(), bound)
         table = pa.Table.from_batches(batches, schema)
+        bound.check(RECORD_BYTES * len(table))
         found = _columns(path, table, columns, optional or {}, bound)
         count(table.schema.names, table.num_rows)
         return found
@@ -62,6 +63,7 @@ def read_parquet(
         bound = Bound(path)
         there = [name for name in {**columns, **(optional or {})} if name in file.schema_arrow.names]
         check_claims(file, bound, there)
+        bound.check(RECORD_BYTES * file.metadata.num_rows)
         texts = [name for name in text_columns(file) if name in there]
     with _told(path, "a Parquet file"), pq.ParquetFile(path, read_dictionary=texts) as file:
         found = _columns(path, file.read(columns=there), columns, optional or {}, bound)

@@ -28,7 +28,7 @@ import pyarrow.parquet as pq
 from scenicq.errors import DataError, Diagnostic
 from scenicq.importers.fields import InvalidError, parse_json
 from scenicq.importers.report import Report
-from scenicq.store.unpacked import Bound, check_claims, decoded_bytes, text_columns
+from scenicq.store.unpacked import RECORD_BYTES, Bound, check_claims, decoded_bytes, text_columns
 
 __all__ = ["GroupedLines", "Runs", "group_lines"]
 
@@ -218,6 +218,7 @@ def _parquet_lines(file: Path, report: Report) -> Iterator[bytes]:
         with pq.ParquetFile(file, read_dictionary=texts) as table:
             row = 0
             for batch in table.iter_batches(batch_size=1024):
+                bound.check(sum(decoded_bytes(column, RECORD_BYTES) for column in batch.columns))
                 for column in batch.columns:
                     bound.add(decoded_bytes(column))
                 for fields in batch.to_pylist(maps_as_pydicts="strict"):

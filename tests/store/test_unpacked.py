@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -130,3 +133,75 @@ def test_results_and_predictions(tmp_path: Path) -> None:
         predictions = write(tmp_path / f"p{suffix}", pa.table({"frame": [TEXT] * ROWS, "class": ["Car"] * ROWS}))
         with pytest.raises(DataError, match="unpacks to more than"):
             read_predictions(predictions)
+
+
+GIANT = 300_000
+"""Rows that pack to a few bytes each, and to less than 256 MiB as bare values."""
+
+
+def sensor_log(folder: Path, rows: int) -> list[object]:
+    """An Argoverse 2 log of one frame."""
+    time, turn = 315_966_253_660_357_000, {"qw": 1.0, "qx": 0.0, "qy": 0.0, "qz": 0.0}
+    pose = {"timestamp_ns": time, **turn, "tx_m": 1.0, "ty_m": 1.0, "tz_m": 0.0}
+    box = {**pose, "category": "REGULAR_VEHICLE", "length_m": 4.0, "width_m": 2.0, "height_m": 1.5}
+    (folder / "log").mkdir(parents=True)
+    columns = {name: pa.repeat(value, rows) for name, value in box.items()}
+    columns["track_uuid"] = pa.array([f"{number:036}" for number in range(rows)])
+    feather.write_feather(pa.table(columns), folder / "log/annotations.feather", compression="zstd")
+    feather.write_feather(pa.Table.from_pylist([pose]), folder / "log/city_SE3_egovehicle.feather")
+    return ["ingest", folder]
+
+
+def forecasting(folder: Path, rows: int) -> list[object]:
+    """An Argoverse 2 forecasting scenario of one step."""
+    (folder / "s").mkdir(parents=True)
+    reals = dict.fromkeys(("position_x", "position_y", "heading", "velocity_x", "velocity_y"), 1.0)
+    row = {"object_type": "vehicle", "timestep": 0, "city": "x", **reals}
+    columns = {name: pa.repeat(value, rows) for name, value in row.items()}
+    columns["track_id"] = pa.array(["AV", *map(str, range(1, rows))])
+    pq.write_table(pa.table(columns), folder / "s/scenario_s.parquet", compression="zstd")
+    return ["ingest", folder]
+
+
+def packed_labels(folder: Path, rows: int) -> list[object]:
+    """An interchange folder of one label."""
+    folder.mkdir()
+    header = {"name": "x", "interchange": 1, "angle": "heading", "classes": "scenic"}
+    (folder / "dataset.json").write_text(json.dumps(header))
+    member = {"class": "Car", "position": [1.0, 2.0], "heading": 0.0, "width": 2.0, "length": 4.0}
+    label = {"id": "f", "recording": "r", "timestamp_us": 0, "map": "m", "ego": member}
+    label["objects"] = [{**member, "id": f"o{number}"} for number in range(rows)]
+    pq.write_table(pa.Table.from_pylist([label]), folder / "labels.parquet", compression="zstd")
+    return ["ingest", folder]
+
+
+def results(folder: Path, rows: int) -> list[object]:
+    """A file of results."""
+    folder.mkdir()
+    row = dict.fromkeys(("frame", "recording", "correspondence", "witness", "cause", "sensors"), "{}")
+    columns = {name: pa.repeat(value, rows) for name, value in {**row, "timestamp_us": 0, "verdict": "match"}.items()}
+    pq.write_table(pa.table(columns), folder / "r.parquet", compression="zstd")
+    return ["report", folder / "r.parquet"]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is counted as Linux does")
+@pytest.mark.parametrize("rows", [GIANT, pytest.param(100_000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("source", [sensor_log, forecasting, packed_labels, results])
+def test_what_a_file_takes_is_bounded_whatever_its_rows_become(
+    source: Callable[[Path, int], list[object]], rows: int, command: str, tmp_path: Path
+) -> None:
+    words = source(tmp_path / "source", rows)
+    size = max(path.stat().st_size for path in (tmp_path / "source").rglob("*") if path.is_file())
+    most = max(1 << 28, 200 * size)
+    target = tmp_path / ("made" if words[0] == "ingest" else "source/r.parquet")
+    alone = peak_bytes(command, "ingest", SAMPLES / "crossroads", tmp_path / "small")
+    assert peak_bytes(command, *words, target) < alone + most
+    assert most < 1600 * GIANT
+
+
+def peak_bytes(*words: object) -> int:
+    """What a command has had in memory at most."""
+    running = subprocess.Popen([*map(str, words)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    _, _, used = os.wait4(running.pid, 0)
+    running.returncode = 0
+    return used.ru_maxrss * 1024

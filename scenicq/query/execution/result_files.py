@@ -20,7 +20,7 @@ from scenicq.errors import DataError, Diagnostic
 from scenicq.query.execution.csv_cells import unquote_cell
 from scenicq.query.execution.result_origin import METADATA, ORIGIN
 from scenicq.query.execution.result_tables import read_row
-from scenicq.store.unpacked import Bound, check_claims, decoded_bytes, text_columns
+from scenicq.store.unpacked import RECORD_BYTES, Bound, check_claims, decoded_bytes, text_columns
 
 __all__ = ["Record", "read_records", "read_results"]
 
@@ -127,6 +127,7 @@ def _of_parquet(path: Path, data: bytes, columns: tuple[str, ...] | None) -> Ite
         bound = Bound(path, len(data))
         with pq.ParquetFile(pa.BufferReader(data)) as parquet:
             check_claims(parquet, bound, columns)
+            bound.check(RECORD_BYTES * parquet.metadata.num_rows)
             texts = text_columns(parquet)
         chosen = None if columns is None else list(columns)
         table = pq.read_table(pa.BufferReader(data), columns=chosen, read_dictionary=texts)
