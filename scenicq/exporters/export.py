@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
@@ -27,6 +26,7 @@ from scenicq.exporters.openlabel import write_openlabel
 from scenicq.match.verdict import Match, Unknown
 from scenicq.query.execution.interval_frames import frames_of
 from scenicq.query.execution.results import Result
+from scenicq.store.atomic_files import whole_folder
 from scenicq.store.dataset import Dataset
 
 __all__ = ["EXPORTS", "ExportSummary", "Exporter"]
@@ -111,21 +111,14 @@ class Exporter:
         Raises:
             DataError: `target-unwritable`.
         """
-        beside = self.target.with_name(f".{self.target.name}.{os.getpid()}.tmp")
         problems: list[Diagnostic] = []
         try:
-            beside.mkdir(parents=True)
-            EXPORTS[self.kind](self, beside, problems)
-            files = sorted(path.relative_to(beside).as_posix() for path in beside.rglob("*") if path.is_file())
-            for name in files:
-                with (beside / name).open("rb") as file:
-                    os.fsync(file.fileno())
-            beside.rename(self.target)
+            with whole_folder(self.target) as folder:
+                EXPORTS[self.kind](self, folder, problems)
+                files = sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file())
         except OSError as error:
             message = f"{self.target} cannot be written: {error.strerror or error}"
             raise DataError(Diagnostic("target-unwritable", message)) from error
-        finally:
-            shutil.rmtree(beside, ignore_errors=True)
         told = (
             (self._further, "further matches of frames that are there already"),
             (self._unknown, "frames that could not be decided"),

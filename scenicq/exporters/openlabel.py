@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import math
 import re
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -107,8 +108,9 @@ def _write(folder: Path, number: int, labels: list[Label], matched: Mapping[str,
         }
     }
     safe = "".join(char if char.isalnum() or char in "-_" else "_" for char in labels[0].recording)
-    # a system counts bytes, of which one character may have four
-    safe = safe.encode()[:_LONGEST_NAME].decode(errors="ignore")
+    # a system counts bytes, of which one character may have four, and may know ASCII alone
+    encoding = sys.getfilesystemencoding()
+    safe = safe.encode(encoding, "replace").replace(b"?", b"_")[:_LONGEST_NAME].decode(encoding, "ignore")
     file = folder / f"{number:05d}_{safe}.json"
     file.write_text(json.dumps(content, ensure_ascii=False, indent=1) + "\n", encoding="utf-8")
 

@@ -15,6 +15,7 @@ from scenicq.forest.nodes import Value
 from scenicq.forest.scenario import BuiltIn, Scenario
 from scenicq.geometry.angles import normalize
 from scenicq.geometry.network import Network
+from scenicq.store.atomic_files import whole_folder
 from scenicq.store.classes import ROOT, is_class
 from scenicq.store.labels import Label, LabelObject
 
@@ -148,12 +149,13 @@ def write_sample(labels: Iterable[Label], network: Network, name: str, folder: P
     """
     lines = [sample_record(label) for label in labels]
     try:
-        folder.mkdir(parents=True)
-        (folder / "labels.jsonl").write_text("\n".join([*lines, ""]), encoding="utf-8")
-        write_map(folder / "maps" / f"{network.name}.geojson", network.features)
-        header = {"name": name, "interchange": 1, "angle": "heading", "classes": "scenic"}
-        (folder / "dataset.json").write_text(json.dumps(header, indent=1) + "\n", encoding="utf-8")
+        with whole_folder(folder) as work:
+            (work / "labels.jsonl").write_text("\n".join([*lines, ""]), encoding="utf-8")
+            write_map(work / "maps" / f"{network.name}.geojson", network.features)
+            header = {"name": name, "interchange": 1, "angle": "heading", "classes": "scenic"}
+            (work / "dataset.json").write_text(json.dumps(header, indent=1) + "\n", encoding="utf-8")
     except FileExistsError:
         raise DataError(Diagnostic("target-exists", f"{folder} is there already")) from None
     except OSError as error:
-        raise DataError(Diagnostic("target-unwritable", f"{folder} cannot be written: {error.strerror}")) from None
+        message = f"{folder} cannot be written: {error.strerror or error}"
+        raise DataError(Diagnostic("target-unwritable", message)) from error

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from collections.abc import Generator
 from contextlib import contextmanager, suppress
@@ -15,7 +16,16 @@ except ImportError:
 
 from scenicq.errors import DataError, Diagnostic
 
-__all__ = ["WholeFile", "sole_writer", "sync_folder", "whole_file", "write_whole"]
+__all__ = [
+    "Spare",
+    "WholeFile",
+    "made_folder",
+    "sole_writer",
+    "sync_folder",
+    "whole_file",
+    "whole_folder",
+    "write_whole",
+]
 
 
 class WholeFile:
@@ -97,6 +107,91 @@ def write_whole(path: Path, text: str) -> None:
         file.write(text.encode())
 
 
+@contextmanager
+def made_folder(folder: Path) -> Generator[None]:
+    """A folder, made if need be; if the block fails, one that was made and that nothing is in goes again.
+
+    Raises:
+        OSError: It cannot be made.
+    """
+    made = not folder.exists()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        yield
+    except BaseException:
+        if made:
+            with suppress(OSError):
+                folder.rmdir()
+        raise
+
+
+@contextmanager
+def whole_folder(path: Path) -> Generator[Path]:
+    """A folder to be written, which gets its name at the end of the block unless that fails.
+
+    Raises:
+        OSError: It cannot be written; FileExistsError where something has the name.
+        DataError: target-busy: another process writes it.
+    """
+    if os.path.lexists(path):
+        raise FileExistsError
+    beside = path.with_name(f".{path.name}.tmp")
+    if beside.is_symlink():
+        beside.unlink()
+    with sole_writer(beside), Spare() as spare:
+        try:
+            _empty(beside)  # of what a process has left that was killed
+            yield beside
+            for file in (each for each in beside.rglob("*") if each.is_file()):
+                with file.open("rb") as written:
+                    os.fsync(written.fileno())
+            beside.rename(path)
+            sync_folder(path.parent)
+        except BaseException as error:
+            spare.close()
+            with suppress(OSError):
+                _empty(beside)
+            if isinstance(error, UnicodeEncodeError):
+                words = f"the system's encoding of names of files, {error.encoding}, has none for {error.object!a}"
+                raise OSError(errno.EILSEQ, words) from error
+            raise
+
+
+def _empty(folder: Path) -> None:
+    """Remove all that is in a folder, with one open folder at a time."""
+    for path in sorted(folder.rglob("*"), reverse=True):
+        if path.is_dir() and not path.is_symlink():
+            path.rmdir()
+        else:
+            path.unlink()
+
+
+class Spare:
+    """An open file of no use, as a context manager: once it is closed, a folder can be listed however few may be open.
+
+    Raises:
+        OSError: Too many are open already.
+    """
+
+    def __init__(self) -> None:
+        """Open it."""
+        self._handle: int | None = os.open(os.devnull, os.O_RDONLY)
+
+    def __enter__(self) -> Spare:
+        """The file."""
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        """Close it."""
+        self.close()
+
+    def close(self) -> None:
+        """Close it, if it is open."""
+        if self._handle is not None:
+            os.close(self._handle)
+            self._handle = None
+
+
 def _locked(handle: int) -> bool:
     """Lock a folder; also true where its file system has no locks."""
     try:
@@ -120,11 +215,11 @@ def sole_writer(folder: Path) -> Generator[None]:
     """
     made = not folder.exists()
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        handle = None if fcntl is None else os.open(folder, os.O_RDONLY)
+        with made_folder(folder):
+            handle = None if fcntl is None else os.open(folder, os.O_RDONLY)
     except OSError as error:
         message = f"{folder} cannot be written: {error.strerror or error}"
-        raise DataError(Diagnostic("target-unwritable", message)) from None
+        raise DataError(Diagnostic("target-unwritable", message)) from error
     try:
         if handle is not None and not _locked(handle):
             hint = "wait until it is done, or choose another target"

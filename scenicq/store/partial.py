@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import IO
 
 from scenicq.errors import DataError, Diagnostic
-from scenicq.store.atomic_files import sync_folder
+from scenicq.store.atomic_files import Spare, sync_folder
 from scenicq.store.manifest import FOLDERS, check_path, find_links, is_dataset
 from scenicq.store.read_lock import nobody_reads
 
@@ -40,6 +40,7 @@ class Partial:
         self.folder = self.target.with_name(f".{self.target.name}.partial")
         self._kept: list[Path] = []
         self._lock: IO[bytes] | None = None
+        self._spare: Spare | None = None
 
     def open(self) -> None:
         """Make or take over the folder.
@@ -50,13 +51,14 @@ class Partial:
         """
         if self.folder.is_symlink():
             raise _through_link(self.target, self.folder)
+        self._spare = Spare()
         try:
             while self._lock is None:
                 self.folder.mkdir(exist_ok=True)
                 self._lock = self._locked()
             for link in find_links(self.folder):
                 link.unlink()  # what an earlier process left there is not ours to go on from
-        except KeyboardInterrupt:
+        except BaseException:
             self._abandon()
             raise
 
@@ -80,11 +82,14 @@ class Partial:
             raise
 
     def _abandon(self) -> None:
-        """Remove a folder that was made and not yet held, unless somebody holds it or it is worth going on from."""
+        """Remove a folder that was made and is not gone on with, unless somebody holds it or has left something."""
+        self._free_spare()
         with suppress(OSError, DataError):
             self._lock = self._lock or self._locked()
-            if self._lock is not None and [path.name for path in self.folder.iterdir()] == [_LOCK]:
-                self.remove()
+            if self._lock is not None:
+                (self.folder / _LOCK).unlink()
+                self.folder.rmdir()
+        self._unlock()
 
     def clear(self) -> None:
         """Remove what an earlier process left in the folder."""
@@ -99,7 +104,11 @@ class Partial:
         if self._lock is not None:
             if fcntl is None:
                 self._unlock()
-            shutil.rmtree(self.folder, ignore_errors=True)
+            self._free_spare()
+            with suppress(OSError):
+                _remove_others(self.folder, {Path(_LOCK)})  # one open folder at a time
+                (self.folder / _LOCK).unlink(missing_ok=True)
+                self.folder.rmdir()
             self._unlock()
 
     def keep(self, files: Sequence[Path]) -> None:
@@ -148,7 +157,12 @@ class Partial:
                     _remove_others(self.target, set(self._kept), name)
         self.remove()
 
+    def _free_spare(self) -> None:
+        if self._spare is not None:
+            self._spare.close()
+
     def _unlock(self) -> None:
+        self._free_spare()
         if self._lock is not None:
             self._lock.close()
             self._lock = None

@@ -735,3 +735,11 @@ FORMATS: dict[str, Any] = {
         Waymo, Argoverse2, Forecasting, Kitti, NuScenes, Interaction, Interchange, OpenLabel, CommonRoad, OpenDrive
     )
 }  # fmt: skip
+
+
+def full(format_: str) -> Document:
+    """A source of a format that has all that its lists name."""
+    document = FORMATS[format_].document()
+    for name in FORMATS[format_].lists:
+        fill(document, name)
+    return document

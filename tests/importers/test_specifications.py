@@ -13,7 +13,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 import pytest
-from full_sources import FORMATS, LISTS, Document, drop, entries, fill, parents
+from full_sources import FORMATS, LISTS, Document, drop, entries, full, parents
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.importers import opendrive, opendrive_worker
@@ -33,13 +33,6 @@ UNASKED = {
 """What is left out because of what another field says."""
 
 CASES = [(format_, name) for format_, source in FORMATS.items() for name in source.lists]
-
-
-def full(format_: str) -> Document:
-    document = FORMATS[format_].document()
-    for name in FORMATS[format_].lists:
-        fill(document, name)
-    return document
 
 
 def take_in(format_: str, document: Document, folder: Path) -> tuple[str, str, Mapping[str, int]]:

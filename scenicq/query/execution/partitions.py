@@ -20,7 +20,7 @@ from typing import Any, cast
 from scenicq.errors import DataError, Diagnostic
 from scenicq.query.execution.results import Funnel
 from scenicq.query.execution.run import QueryOptions, RecordingRange
-from scenicq.store.atomic_files import whole_file
+from scenicq.store.atomic_files import made_folder, whole_file
 from scenicq.store.dataset import Dataset
 
 __all__ = ["Gathered", "Partition", "fingerprint", "gather", "is_done", "partitions", "write_partition"]
@@ -111,8 +111,7 @@ def write_partition(
     """
     target = _file(folder, question, piece.number, piece.count)
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with whole_file(target) as file:
+        with made_folder(folder), whole_file(target) as file:
             for each in records:
                 file.write((json.dumps(each, ensure_ascii=False) + "\n").encode())
             counts = {name: getattr(funnel, name) for name in _COUNTS}

@@ -17,7 +17,7 @@ from scenicq.query.execution.partitions import fingerprint
 from scenicq.query.execution.program_files import SiblingFiles, program_text
 from scenicq.query.execution.results import IntervalSpan, Result
 from scenicq.query.execution.run import Query, QueryOptions
-from scenicq.store.atomic_files import write_whole
+from scenicq.store.atomic_files import made_folder, write_whole
 from scenicq.store.dataset import open_dataset
 from scenicq.temporal.interval_options import IntervalOptions
 
@@ -85,8 +85,8 @@ def note_question(folder: Path, query: Query) -> None:
         "options": asdict(query.options),
     }
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        write_whole(file, json.dumps(content, default=sorted) + "\n")
+        with made_folder(folder):
+            write_whole(file, json.dumps(content, default=sorted) + "\n")
     except OSError as error:
         raise DataError(Diagnostic("target-unwritable", f"{file} cannot be written: {error.strerror}")) from None
 
