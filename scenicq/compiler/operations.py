@@ -6,6 +6,7 @@ Programs may also call operators as functions, by the names that Scenic's compil
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 from scenicq.compiler import operators
@@ -22,21 +23,23 @@ from scenicq.syntax.phrases import BOX_PARTS, OPERATORS, PhraseRow, each_meaning
 if TYPE_CHECKING:
     from scenicq.compiler.interpreter import Interpreter
 
-__all__ = ["operator_functions", "phrase"]
+__all__ = ["operator_functions", "phrase", "values_of"]
 
 
 class _Operation(NamedTuple):
     """What an operator means.
 
     Attributes:
-        meaning: Takes the interpreter, the values of the operands and the span.
+        meaning: Takes the values of the operands and the span.
         look_ups: How many look-ups on the map it takes at most.
         is_spread: Whether it applies to every outcome of random choices of objects.
+        takes_run: Whether the meaning takes the interpreter first.
     """
 
     meaning: Callable[..., ModelValue]
     look_ups: int = 0
     is_spread: bool = True
+    takes_run: bool = False
 
 
 class _Refusal(NamedTuple):
@@ -44,11 +47,6 @@ class _Refusal(NamedTuple):
 
     label: str
     hint: str
-
-
-def _pure(function: Callable[..., ModelValue]) -> Callable[..., ModelValue]:
-    """The meaning of an operator that asks nothing of the interpreter."""
-    return lambda run, *values: function(*values)
 
 
 def _relative_position(target: ModelValue, origin: ModelValue, span: Span) -> ModelValue:
@@ -59,19 +57,12 @@ def _implies(left: ModelValue, right: ModelValue, span: Span) -> ModelValue:
     return operators.combine("or", [operators.combine("not", [left], span), right], span)
 
 
-def _sight(combine: Callable[..., ModelValue]) -> _Operation:
-    def part(run: Interpreter, region: ModelValue, viewer: ModelValue, span: Span) -> ModelValue:
-        return combine(operators.existing(region, span), operators.visible_region(viewer, span), span)
-
-    return _Operation(part)
+def _sight(combine: Callable[..., ModelValue], region: ModelValue, viewer: ModelValue, span: Span) -> ModelValue:
+    return combine(operators.existing(region, span), operators.visible_region(viewer, span), span)
 
 
-def _by_ego(sight: _Operation) -> _Operation:
-    return _Operation(lambda run, region, span: sight.meaning(run, region, run.ego(span), span))
-
-
-def _part(name: str) -> _Operation:
-    return _Operation(lambda run, target, span: part_of(name, target, span))
+def _by_ego(sight: Callable[..., ModelValue], run: Interpreter, region: ModelValue, span: Span) -> ModelValue:
+    return sight(region, run.ego(span), span)
 
 
 def _initial(run: Interpreter, span: Span) -> ModelValue:
@@ -80,46 +71,46 @@ def _initial(run: Interpreter, span: Span) -> ModelValue:
     return True
 
 
-_SEEN, _UNSEEN = _sight(operators.region_intersection), _sight(operators.region_difference)
-_DISTANCE = _Operation(_pure(operators.distance_to), look_ups=1)
-_ANGLE = _Operation(_pure(operators.angle_to))
-_FROM = _Operation(lambda run, origin, target, span: operators.distance_to(target, origin, span), look_ups=1)
-_ANGLE_FROM = _Operation(lambda run, origin, target, span: operators.angle_to(target, origin, span))
+_SEEN, _UNSEEN = (partial(_sight, each) for each in (operators.region_intersection, operators.region_difference))
+_DISTANCE = _Operation(operators.distance_to, look_ups=1)
+_ANGLE = _Operation(operators.angle_to)
+_FROM = _Operation(lambda origin, target, span: operators.distance_to(target, origin, span), look_ups=1)
+_ANGLE_FROM = _Operation(lambda origin, target, span: operators.angle_to(target, origin, span))
 _OVER_TIME = _Refusal("does not describe one instant", "a scene is matched at one instant: state what holds then")
 _IN_SPACE = _Refusal("labels are matched in 2D", "use what has a meaning in the plane")
 _OPERATIONS: dict[PhraseRow, _Operation | _Refusal] = each_meaning(OPERATORS, {
     "{left} until {right}": _OVER_TIME,
-    "{left} implies {right}": _Operation(_pure(_implies), is_spread=False),
+    "{left} implies {right}": _Operation(_implies, is_spread=False),
     "always {condition}": _OVER_TIME,
     "eventually {condition}": _OVER_TIME,
     "next {condition}": _OVER_TIME,
-    "{region} visible from {viewer}": _SEEN,
-    "{region} not visible from {viewer}": _UNSEEN,
-    "{viewer} can see {target}": _Operation(_pure(operators.can_see)),
-    "{left} intersects {right}": _Operation(_pure(operators.intersects)),
-    "{origin} offset along {direction} by {offset}": _Operation(_pure(operators.along)),
-    "{origin} offset by {offset}": _Operation(_pure(operators.offset)),
-    "{left} relative to {right}": _Operation(_pure(operators.relative_to)),
-    "{field} at {position}": _Operation(_pure(operators.direction_at), look_ups=1),
-    "relative position of {target} [from {origin}]": _Operation(_pure(_relative_position)),
-    "relative heading of {target} [from {origin}]": _Operation(_pure(operators.relative_heading)),
-    "apparent heading of {target} [from {origin}]": _Operation(_pure(operators.apparent_heading)),
+    "{region} visible from {viewer}": _Operation(_SEEN),
+    "{region} not visible from {viewer}": _Operation(_UNSEEN),
+    "{viewer} can see {target}": _Operation(operators.can_see),
+    "{left} intersects {right}": _Operation(operators.intersects),
+    "{origin} offset along {direction} by {offset}": _Operation(operators.along),
+    "{origin} offset by {offset}": _Operation(operators.offset),
+    "{left} relative to {right}": _Operation(operators.relative_to),
+    "{field} at {position}": _Operation(operators.direction_at, look_ups=1),
+    "relative position of {target} [from {origin}]": _Operation(_relative_position),
+    "relative heading of {target} [from {origin}]": _Operation(operators.relative_heading),
+    "apparent heading of {target} [from {origin}]": _Operation(operators.apparent_heading),
     "distance to {target} [from {origin}]": _DISTANCE,
     "distance from {origin} [to {target}]": _FROM,
-    "distance past {target} [of {origin}]": _Operation(_pure(operators.distance_past)),
+    "distance past {target} [of {origin}]": _Operation(operators.distance_past),
     "angle to {target} [from {origin}]": _ANGLE,
     "angle from {origin} [to {target}]": _ANGLE_FROM,
     "azimuth to {target} [from {origin}]": _ANGLE,
     "azimuth from {origin} [to {target}]": _ANGLE_FROM,
     "altitude to {target} [from {origin}]": _IN_SPACE,
     "altitude from {origin} [to {target}]": _IN_SPACE,
-    "follow {field} [from {origin}] for {distance}": _Operation(follow, look_ups=100),
-    "visible {region}": _by_ego(_SEEN),
-    "not visible {region}": _by_ego(_UNSEEN),
-    **{f"{part} of {{target}}": _part(part) for part in BOX_PARTS},
-    "{x} @ {y}": _Operation(lambda run, x, y, span: to_vector((x, y), span), is_spread=False),
-    "{value} deg": _Operation(_pure(operators.degrees), is_spread=False),
-    "initial scenario": _Operation(_initial),
+    "follow {field} [from {origin}] for {distance}": _Operation(follow, look_ups=100, takes_run=True),
+    "visible {region}": _Operation(partial(_by_ego, _SEEN), takes_run=True),
+    "not visible {region}": _Operation(partial(_by_ego, _UNSEEN), takes_run=True),
+    **{f"{part} of {{target}}": _Operation(partial(part_of, part)) for part in BOX_PARTS},
+    "{x} @ {y}": _Operation(lambda x, y, span: to_vector((x, y), span), is_spread=False),
+    "{value} deg": _Operation(operators.degrees, is_spread=False),
+    "initial scenario": _Operation(_initial, takes_run=True),
 })  # fmt: skip
 _FUNCTIONS: dict[str, str] = {
     "FieldAt": "{field} at {position}",
@@ -152,7 +143,7 @@ def _apply(run: Interpreter, operation: _Operation, operands: Sequence[ModelValu
     run.budget.step(span, operation.look_ups * run.budget.LOOK_UP_STEPS)
 
     def now(*values: ModelValue) -> ModelValue:
-        return operation.meaning(run, *values, span)
+        return operation.meaning(*((run,) if operation.takes_run else ()), *values, span)
 
     return lift(now, *operands, span=span, spread=holds_instances if operation.is_spread else None)
 
@@ -192,4 +183,18 @@ def phrase(run: Interpreter, node: ast.Phrase, value: Callable[[ast.Expression],
     if isinstance(operation, _Refusal):
         message = f"`{span.text}` is not supported"
         raise fail("unsupported-construct", message, span, operation.label, (operation.hint,))
-    return _apply(run, operation, [run.ego(span) if part is None else value(part) for part in node.operands], span)
+    return _apply(run, operation, values_of(node, value, run.ego), span)
+
+
+def values_of(
+    node: ast.Phrase, value: Callable[[ast.Expression], ModelValue], ego: Callable[[Span], ModelValue]
+) -> list[ModelValue]:
+    """The values of a phrase's operands; of one that is left out the ego, or None where that is not meant.
+
+    Args:
+        node: The phrase.
+        value: Evaluates an operand.
+        ego: Gives the ego.
+    """
+    places = zip(node.row.operands, node.operands, strict=True)
+    return [value(part) if part is not None else ego(node.span) if place.is_ego else None for place, part in places]

@@ -12,6 +12,7 @@ from scenicq.compiler.coerce import kind_of_model, property_node, to_heading, to
 from scenicq.compiler.deviations import DEVIATIONS, deviation, leaves_the_plane
 from scenicq.compiler.environment import FIRST_NAMES, Budget
 from scenicq.compiler.following import follow
+from scenicq.compiler.operations import values_of
 from scenicq.compiler.orientations import orientation, surely_gives_a_heading
 from scenicq.compiler.random_values import holds_instances, lift, make_choice
 from scenicq.compiler.specifiers import BoundSpecifier
@@ -288,11 +289,7 @@ def bind(node: ast.Specifier, evaluate: Evaluate, around: SpecifierContext) -> B
     """
     if isinstance(node, ast.WithSpecifier):
         return _with(node, evaluate(node.value), around)
-    values = [None if part is None else evaluate(part) for part in node.operands]
-    for number, (operand, part) in enumerate(zip(node.row.operands, node.operands, strict=True)):
-        if part is None and operand.is_ego:
-            values[number] = around.ego(node.span)
-    bound = _bind_each(_MEANINGS[node.row], values, node.span, around)
+    bound = _bind_each(_MEANINGS[node.row], values_of(node, evaluate, around.ego), node.span, around)
     return _as_parent(bound) if around.version == 3 and "heading" in bound.optionally else bound
 
 
