@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, cast
 
@@ -14,17 +13,16 @@ from scenicq.compiler.following import follow
 from scenicq.compiler.lookups import look_up
 from scenicq.compiler.random_values import each_existing, regions_apart
 from scenicq.compiler.region_attributes import REGION_METHODS, holds_regions, of_region
-from scenicq.compiler.unavailable import unavailable_attribute
+from scenicq.compiler.suggestions import unknown_attribute
 from scenicq.compiler.values import Builtin, Choice, Instance, ModelValue, Module, ScenicClass, describe, fail, is_node
-from scenicq.errors import ScenarioError, Span, similar
+from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.forest.angle_wrap import one_turn
 from scenicq.forest.kinds import kind_of
 from scenicq.forest.nodes import ArithmeticOp, Node
-from scenicq.geometry.elements import Lane, Maneuver, NetworkElement, Signal
+from scenicq.geometry.elements import Maneuver, NetworkElement, Signal
 from scenicq.geometry.network import Network
 from scenicq.limits import LIMITS
-from scenicq.syntax.hints import BIKE_LANES, MOVES, STANDS
 
 if TYPE_CHECKING:
     from scenicq.compiler.interpreter import Interpreter
@@ -84,60 +82,11 @@ def attribute(run: Interpreter, value: ModelValue, name: str, span: Span) -> Mod
     if found is MISSING and isinstance(options := regions_apart(value), Choice):
         return _of_choice(run, options, name, span)
     if found is MISSING:
-        raise _unknown(value, name, span)
+        if value is None and is_of_elements(name):
+            raise fail("map-lacks", f"the map has no element here that `{name}` could be of", span, "this is of None",
+                       ("leave out with a condition where there is none",))  # fmt: skip
+        raise unknown_attribute(value, name, _names(value), _PLACES.get(name.lstrip("_"), ""), span)
     return found
-
-
-def _unknown(value: ModelValue, name: str, span: Span) -> ScenarioError:
-    if isinstance(value, Instance) and name.lstrip("_") in _PLACES:
-        return fail("unknown-attribute", f"{describe(value)} has no attribute `{name}`", span, "not found",
-                    (f"`network.{_PLACES[name.lstrip('_')]}(...)` says what lies at any point",))  # fmt: skip
-    if is_node(value) or isinstance(value, Instance | NetworkElement):
-        refused = unavailable_attribute(name, span)
-        if refused is not None:
-            return refused
-    if isinstance(value, Lane) and (side := _BESIDE.fullmatch(name)):
-        left = side[0].lower().find("left") >= 0
-        return fail(
-            "unknown-attribute",
-            f"{describe(value)} has no attribute `{name}`",
-            span,
-            "not found",
-            (f"`X.laneSection.laneTo{'Left' if left else 'Right'}` is the lane beside that of an object `X`",),
-        )
-    if value is None and is_of_elements(name):
-        return fail("map-lacks", f"the map has no element here that `{name}` could be of", span, "this is of None",
-                    ("leave out with a condition where there is none",))  # fmt: skip
-    close = similar(name, _names(value))
-    hints = (f"`{close}` is an attribute with a similar name",) if close else ()
-    if isinstance(value, Network) and name in ("bikeLanes", "bikeLane", "bicycleLanes"):
-        hints = (BIKE_LANES,)
-    if isinstance(value, Instance) and (said := _SAID.get(name.replace("_", "").lower())):
-        hints = (said,)
-    shown = f"a {kind_of(cast(Node, value))}" if is_node(value) else describe(value)
-    owner = _OWNER.search(span.source.text, 0, span.start)
-    label = f"`{owner[1]}` is {shown}" if owner else "not found"
-    return fail("unknown-attribute", f"{shown} has no attribute `{name}`", span, label, hints)
-
-
-_BESIDE = re.compile(
-    r"(?i)_?(left|right)_?(lane|neighbou?r)?|(lane|neighbou?r)_?(to_?)?(left|right)|laneTo(Left|Right)"
-)
-"""What people call the lane beside another."""
-_TURNS = "`angularSpeed` is how fast it turns, in radians a second"
-_SAID = {
-    "yawrate": _TURNS, "angularvelocity": _TURNS, "turnrate": _TURNS, "accel": "`acceleration` is along the course",
-    "isparked": STANDS, "parked": STANDS, "isstopped": STANDS, "stopped": STANDS, "isstationary": STANDS,
-    "ismoving": MOVES, "moving": MOVES,
-    "category": "`new Bus` asks for a class", "type": "`new Bus` asks for a class",
-    "occluded": "`beyond Y by Range(2, 30)` places an object where Y hides it from the ego",
-    "isoccluded": "`beyond Y by Range(2, 30)` places an object where Y hides it from the ego",
-    "visible": "`ego can see X` asks whether X is in view", "isvisible": "`ego can see X` asks whether X is in view",
-    "distance": "`distance from ego to X` is the distance",
-}  # fmt: skip
-"""How Scenic says what people ask an object for, by the attribute in small letters."""
-_OWNER = re.compile(r"([A-Za-z_][\w.]{0,60})\.\Z")
-"""The dotted name before an attribute."""
 
 
 def _of_choice(run: Interpreter, value: Choice, name: str, span: Span) -> ModelValue:

@@ -5,14 +5,13 @@ from __future__ import annotations
 from typing import Protocol
 
 from scenicq.budget import look
-from scenicq.compiler.unavailable import unavailable_name
+from scenicq.compiler.suggestions import unavailable_name, unknown_name
 from scenicq.compiler.values import ModelValue, fail
-from scenicq.errors import Span, similar
+from scenicq.errors import Span
 from scenicq.forest.nodes import Node
 from scenicq.geometry.features import region_name
 from scenicq.geometry.network import Network
 from scenicq.limits import LIMITS
-from scenicq.syntax.hints import BIKE_LANES, MOVES, STANDS, TURNS
 
 __all__ = ["FIRST_LIBRARIES", "FIRST_NAMES", "Budget", "Course", "Environment"]
 
@@ -67,34 +66,6 @@ class Budget:
     def leave(self) -> None:
         """Leave a call."""
         self.depth -= 1
-
-
-_SYNONYMS = {
-    "crosswalk": "crossing", "crosswalks": "crossing", "zebra": "crossing", "walkway": "sidewalk",
-    "footpath": "sidewalk", "pavement": "sidewalk", "junction": "intersection", "crossroads": "intersection",
-    "street": "road", "roadway": "road", "roads": "road", "kerb": "curb", "intersections": "intersection",
-    "sidewalks": "sidewalk", "crossings": "crossing", "car": "Car", "vehicle": "Vehicle", "truck": "Truck",
-    "Person": "Pedestrian", "Walker": "Pedestrian", "Human": "Pedestrian", "Bike": "Bicycle", "Cyclist": "Bicycle",
-    "Bicyclist": "Bicycle", "Motorbike": "Motorcycle", "Motorcyclist": "Motorcycle", "Lorry": "Truck",
-    "Worker": "ConstructionWorker", "Policeman": "PoliceOfficer", "Scooter": "PersonalMobility", "Dog": "Animal",
-    "SchoolBus": "Bus", "SUV": "Car", "Taxi": "Car", "Pickup": "Car", "Bollard": "Barrier",
-}  # fmt: skip
-"""What people call what the driving model has."""
-_SIGNS = "labels of signs are of class `Prop`"
-_SAID = {
-    "Sign": _SIGNS, "StopSign": _SIGNS, "TrafficSign": _SIGNS,
-    "distance": "`distance from a to b` has no brackets", "dist": "`distance from a to b` is the distance",
-    "angle": "`angle from a to b` has no brackets", "velocity": "`X.velocity` is that of an object X",
-    "speed": "`X.speed` is that of an object X", "heading": "`X.heading` is that of an object X",
-    "parked": STANDS, "stopped": STANDS, "moving": MOVES, "turning": TURNS, "bikeLane": BIKE_LANES,
-    "oncoming": "`facing Range(160, 200) deg relative to ego.heading`",
-    "lane": "`X.lane` is the lane of an object X", "leftLane": "`X.laneSection.laneToLeft` is the lane left of X's",
-    "rightLane": "`X.laneSection.laneToRight` is the lane right of X's",
-    "weather": "`param weather = 'rain'` compares what labels say of the weather",
-    "time": "`param time = 12` compares what labels say of the time",
-    "self": "`self` stands in classes alone; `require` after the object asks of it by its name",
-}  # fmt: skip
-"""How the driving model says what people say with another name."""
 
 
 class Environment:
@@ -175,17 +146,7 @@ class Environment:
                            "has no value yet", (f"`global {name}` says that the program's own is meant",))  # fmt: skip
             known.update(current.names)
             current = current.parent
-        close = similar(name, known)
-        hints = (f"`{close}` has a similar name",) if close else ()
-        if _SYNONYMS.get(name) in known:
-            hints = (f"`{_SYNONYMS[name]}` is what Scenic calls it",)
-        elif name in _SAID:
-            hints = (_SAID[name],)
-        elif (region := self._region_of_kind(name)) is not None:
-            hints = (f"`network.{region}` is what the map has of this kind",)
-        elif not close and "roadDirection" not in known:
-            hints = ("names such as `road` and `Car` come with `model scenic.domains.driving.model`",)
-        raise fail("unknown-name", f"`{name}` is not defined", span, "not found", hints)
+        raise unknown_name(name, known, self._region_of_kind(name), span)
 
     def _region_of_kind(self, name: str) -> str | None:
         """What the network calls elements of a kind that Scenic does not know, by the kind's name or its region's."""
