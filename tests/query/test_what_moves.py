@@ -1,5 +1,8 @@
 """How an object moves is only ever observed: wherever a plain value is wanted, no default of a class stands in."""
 
+import json
+import subprocess
+
 import pytest
 
 from scenicq.errors import ScenicqError, Source
@@ -128,6 +131,28 @@ def test_samples_are_read_as_they_are_observed(moving, place, way):
     assert Match in verdicts(moving, OVER_TIME[place].format(every), WAYS[way])
     some = " or ".join(f"({each})" for each in conditions(1))
     assert Match not in verdicts(moving, OVER_TIME[place].format(some), WAYS[way])
+
+
+COMMANDS = (("auto",), ("smt",), ("monolithic",), ("auto", "--no-prefilter"), ("smt", "--no-prefilter", "--jobs", "2"))
+
+
+@pytest.mark.parametrize("words", COMMANDS, ids=" ".join)
+@pytest.mark.parametrize("place", ["frames", *OVER_TIME])
+@pytest.mark.one_in(9)
+def test_the_installed_command_reads_what_is_observed(moving, still_unknown, place, words, command, tmp_path):
+    form = "require ({0})" if place == "frames" else OVER_TIME[place]
+
+    def told(dataset: Dataset, condition: str) -> list[str]:
+        (tmp_path / "p.scenic").write_text(HEAD + form.format(condition) + "\n")
+        line = [command, "match", tmp_path / "p.scenic", dataset.path, "--format", "jsonl", "--exit-zero", "--method"]
+        run = subprocess.run([*map(str, line), *words], capture_output=True, text=True, check=False)
+        assert run.returncode == 0 or "error[impossible-requirement]" in run.stderr, run.stderr
+        return [json.loads(each)["verdict"] for each in run.stdout.splitlines()]
+
+    every, some = (joint.join(f"({each})" for each in conditions(n)) for n, joint in enumerate((" and ", " or ")))
+    assert told(moving, every).count("match") >= (SAMPLES - 2 if place == "frames" else 1)
+    assert "match" not in told(moving, some)
+    assert "match" not in told(still_unknown, some)
 
 
 @pytest.mark.parametrize("way", WAYS)
