@@ -13,7 +13,6 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from scenicq.compiler.coerce import kind_of_model
-from scenicq.compiler.environment import Course
 from scenicq.compiler.exclusions import Exclusions
 from scenicq.compiler.random_values import LACKING
 from scenicq.compiler.values import Choice, ModelValue, fail, is_node
@@ -26,11 +25,25 @@ from scenicq.limits import LIMITS
 if TYPE_CHECKING:
     from scenicq.compiler.interpreter import Interpreter
 
-__all__ = ["as_test", "option_of", "split", "without_courses"]
+__all__ = ["Course", "as_test", "option_of", "split", "without_courses"]
+
+
+class Course:
+    """What decides the tests of a condition that is evaluated; where this stands by itself, there must be none."""
+
+    __slots__ = ()
+
+    def decide(self, test: Node, span: Span) -> bool:
+        """What a random test comes out as.
+
+        Raises:
+            ScenarioError: random-branch, where the condition may take one course alone.
+        """
+        raise _refused(span, "how often a loop runs must be known")
 
 
 @dataclass(eq=False, slots=True)
-class _Taken:
+class _Taken(Course):
     """One course.
 
     Attributes:
@@ -48,7 +61,7 @@ class _Taken:
     outcomes: list[bool] = field(default_factory=list[bool])
 
     def decide(self, test: Node, span: Span) -> bool:
-        """See `Course`."""
+        """What the course says, else that the test holds."""
         number, outcome = len(self.tests), True
         if number < len(self.given):
             before, outcome = self.given[number]
@@ -59,11 +72,6 @@ class _Taken:
         self.outcomes.append(outcome)
         self.around.enter_context(self.excluded.assuming(test, int(outcome), 2))
         return outcome
-
-
-class _None:
-    def decide(self, test: Node, span: Span) -> bool:
-        raise _refused(span, "how often a loop runs must be known")
 
 
 def _refused(span: Span, label: str) -> ScenarioError:
@@ -82,7 +90,7 @@ def _on(run: Interpreter, course: Course) -> Generator[None]:
 
 def without_courses(run: Interpreter) -> AbstractContextManager[None]:
     """While what is evaluated must have one course, although objects are read as a label shows them."""
-    return _on(run, _None())
+    return _on(run, Course())
 
 
 def split(run: Interpreter, evaluate: Callable[[], Node], span: Span) -> Node:

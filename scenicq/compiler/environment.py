@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Protocol
-
 from scenicq.budget import look
 from scenicq.compiler.suggestions import unavailable_name, unknown_name
 from scenicq.compiler.values import ModelValue, fail
 from scenicq.errors import Span
-from scenicq.forest.nodes import Node
 from scenicq.geometry.features import region_name
 from scenicq.geometry.network import Network
 from scenicq.limits import LIMITS
 
-__all__ = ["FIRST_LIBRARIES", "FIRST_NAMES", "Budget", "Course", "Environment"]
+__all__ = ["FIRST_LIBRARIES", "FIRST_NAMES", "Budget", "Environment"]
 
 FIRST_LIBRARIES = frozenset({"gtaLib", "mars"})
 """The 2019 paper's libraries."""
@@ -159,15 +156,3 @@ class Environment:
     def set(self, name: str, value: ModelValue) -> None:
         """Give a name a value."""
         self.shared.get(name, self).names[name] = value
-
-
-class Course(Protocol):
-    """What decides the tests of a condition that is evaluated."""
-
-    def decide(self, test: Node, span: Span) -> bool:
-        """What a random test comes out as.
-
-        Raises:
-            ScenarioError: random-branch, where the condition may take one course alone.
-        """
-        ...

@@ -14,9 +14,10 @@ from scenicq.compiler.assignment import assign
 from scenicq.compiler.classes import bind_arguments, define_class, refuse_decorators
 from scenicq.compiler.coerce import to_region, to_scalar
 from scenicq.compiler.comparisons import binary, iterate
+from scenicq.compiler.courses import Course
 from scenicq.compiler.deviations import deviation, leaves_the_plane
 from scenicq.compiler.element_lookups import Lookups
-from scenicq.compiler.environment import Budget, Course, Environment
+from scenicq.compiler.environment import Budget, Environment
 from scenicq.compiler.exclusions import Exclusions
 from scenicq.compiler.expressions import evaluate
 from scenicq.compiler.items import items_of

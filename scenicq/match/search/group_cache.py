@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Protocol
 
 from scenicq.budget import Exhausted, Trials, look
 from scenicq.forest.compute import CannotEvaluate
@@ -26,15 +25,7 @@ from scenicq.match.problem.radius import within_radius
 from scenicq.match.search.choice_search import Ask, decide_with_choices
 from scenicq.match.search.group_plan import GroupPlan
 
-__all__ = ["Asker", "GroupCache", "known_of", "surely", "translated"]
-
-
-class Asker(Protocol):
-    """Puts groups to a solver."""
-
-    def __call__(self, items: Sequence[Sequence[Item]]) -> Outcome:
-        """Decide groups together."""
-        ...
+__all__ = ["GroupCache", "known_of", "surely", "translated"]
 
 
 @dataclass(eq=False, slots=True)
@@ -52,7 +43,7 @@ class GroupCache:
 
     options: MatchOptions
     problem: LabelProblem
-    ask: Asker
+    ask: Ask
     lookups: MapLookups
     trials: Trials = field(default_factory=lambda: Trials(LIMITS.witness_trials))
     patience: Patience = Patience.ALL

@@ -25,7 +25,8 @@ from scenicq.match.problem.outcome import Outcome, Patience, Refuted, Satisfied,
 from scenicq.match.problem.symmetry import in_one_order
 from scenicq.match.search.arc_consistency import arc_consistent
 from scenicq.match.search.backtracking import Consistency, Reporter, find_assignments
-from scenicq.match.search.group_cache import Asker, GroupCache, known_of, surely, translated
+from scenicq.match.search.choice_search import Ask
+from scenicq.match.search.group_cache import GroupCache, known_of, surely, translated
 from scenicq.match.search.group_plan import GroupPlan, MatchPlan
 
 __all__ = ["Failure", "LabelSearch", "Solution"]
@@ -88,7 +89,7 @@ class LabelSearch:
     scenario: Scenario
     options: MatchOptions
     problem: LabelProblem
-    ask: Asker
+    ask: Ask
     reporter: Reporter | None = None
     lookups: MapLookups = field(default_factory=MapLookups)
     failure: Failure | None = None
