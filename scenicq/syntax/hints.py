@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from scenicq.syntax.tokens import Token
 
-__all__ = ["BIKE_LANES", "MOVES", "STANDS", "TURNS", "condition_hint", "phrase_hint", "unit_hint"]
+__all__ = ["BIKE_LANES", "MOVES", "STANDS", "TURNS", "condition_hint", "phrase_hint", "place_hint", "unit_hint"]
 
 _LENGTH, _SPEED, _TIME = "lengths are in metres", "speeds are in metres a second", "times are in seconds"
 _DEGREES, _RADIANS = "`deg` stands for degrees", "angles are in radians"
@@ -48,6 +48,14 @@ _MADE = {
     "front": "`ahead of X by Range(0, 20)` places an object in front of another",
 }  # fmt: skip
 """How an object is described that people describe with that word."""
+_FAR = "a requirement says how far: `require (distance from a to b) < 10`"
+_OUT = "a requirement says where it is not: `in everywhere` and `require not (a.position in road)`"
+_ASIDE = "`at X offset by Range(1, 6) @ Range(-5, 5)` is an area on the right of X"
+_PLACED = {
+    "near": _FAR, "within": _FAR, "close": _FAR, "off": _OUT, "outside": _OUT, "not": _OUT,
+    "next": _ASIDE, "beside": _ASIDE, "alongside": _ASIDE,
+}  # fmt: skip
+"""What people try to place objects with, and how Scenic says it."""
 _FURTHEST = 4
 """Words before the place where the parser cannot go on that may say what was meant."""
 
@@ -90,3 +98,8 @@ def phrase_hint(tokens: Sequence[Token], index: int) -> str:
 def condition_hint(word: str) -> str:
     """How the condition is said that people write with a word between two names; nothing for other words."""
     return _SAID.get(word, "")
+
+
+def place_hint(word: str) -> str:
+    """How objects are placed that people place with a word that starts no specifier; nothing for other words."""
+    return _PLACED.get(word, "")

@@ -10,7 +10,7 @@ from scenicq.syntax import ast
 from scenicq.syntax.jumps import check_jumps
 from scenicq.syntax.lexer import tokenize
 from scenicq.syntax.phrases import INFIX_WORDS, VERSIONS
-from scenicq.syntax.scenic_statements import ProgramParser
+from scenicq.syntax.statements import ProgramParser
 from scenicq.syntax.tokens import Token
 from scenicq.syntax.versions import choose_version, find_evidence
 from scenicq.syntax.walk import check_height
