@@ -111,8 +111,8 @@ class Limits:
     unobserved_choices: int = _coarser(
         8,
         "choices",
-        "inside one comparison with what is not observed, whose outcomes are told apart",
-        "the comparison may hold and may not",
+        "inside one comparison with what is not observed, and conditions of that kind asked for twice, told apart",
+        "the comparison, or each place where it is asked for, may hold and may not",
     )
     difference_terms: int = _undecided(
         4096,

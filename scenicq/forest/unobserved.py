@@ -26,6 +26,7 @@ from scenicq.forest.nodes import (
     Select,
     VectorOf,
 )
+from scenicq.forest.value_numbers import ValueNumbers, is_total, without_negation
 from scenicq.forest.walk import children, postorder, transform
 from scenicq.limits import LIMITS
 
@@ -48,7 +49,7 @@ def certain_and_possible(root: Node, unobserved: Callable[[Feature], bool]) -> T
     Returns:
         The condition itself twice where it reads nothing unobserved.
     """
-    return _Reader(unobserved).truths(root, LIMITS.unobserved_choices)
+    return _Reader(unobserved).apart(root, LIMITS.unobserved_choices)
 
 
 def with_any_value(root: Node, unobserved: Callable[[Feature], bool]) -> Node:
@@ -79,6 +80,59 @@ _MIRRORED = {
 class _Reader:
     def __init__(self, unobserved: Callable[[Feature], bool]) -> None:
         self._unobserved = unobserved
+        self._numbers = ValueNumbers()
+        self._known: dict[int, int] = {}
+        self._alive: list[Node] = []  # as numbers are known by ids
+
+    def _number(self, node: Node) -> int:
+        self._alive.append(node)
+        return self._numbers.expression(node, known=self._known)
+
+    def apart(self, root: Node, splits: int) -> Truths:
+        """As `certain_and_possible`: what is asked for several times comes out the same each time."""
+        base = self._repeated(root) if splits else None
+        if base is None:
+            return self.truths(root, LIMITS.unobserved_choices)
+        number = self._number(base)
+        self._alive.append(root)
+        certain, possible = self.truths(base, LIMITS.unobserved_choices)
+        cases: list[Truths] = []
+        for value in (True, False):
+
+            def given(node: Node, value: bool = value) -> Node:
+                if kind_of(node) != "boolean":
+                    return node
+                own, positive = without_negation(node)
+                return build.constant(value == positive) if self._number(own) == number else node
+
+            cases.append(self.apart(transform(root, given), splits - 1))
+        (sure, may), (sure_not, may_not) = cases
+        either = _connected(LogicOp.AND, [
+            _connected(LogicOp.OR, [build.opposite(possible), sure]), _connected(LogicOp.OR, [certain, sure_not]),
+        ])  # fmt: skip
+        some = _connected(LogicOp.OR, [
+            _connected(LogicOp.AND, [possible, may]), _connected(LogicOp.AND, [build.opposite(certain), may_not]),
+        ])  # fmt: skip
+        return either, some
+
+    def _repeated(self, root: Node) -> Node | None:
+        """A condition on what is not observed that is asked for at several places; None if there is none."""
+        reading: set[int] = set()
+        seen: set[int] = set()
+        for node in postorder((root,)):
+            below = children(node)
+            if (isinstance(node, Feature) and self._unobserved(node)) or any(id(each) in reading for each in below):
+                reading.add(id(node))
+            if isinstance(node, Logic) and node.op is LogicOp.NOT:
+                continue  # it counts as what it negates, where it is asked for
+            for each in below:
+                if id(each) in reading and kind_of(each) == "boolean":
+                    base, _ = without_negation(each)
+                    number = self._number(base)
+                    if number in seen and all(map(is_total, postorder((base,)))):
+                        return base
+                    seen.add(number)
+        return None
 
     def truths(self, root: Node, selects: int) -> Truths:
         """As `certain_and_possible`; at most so many choices inside one comparison are told apart."""

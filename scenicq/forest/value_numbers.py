@@ -1,4 +1,7 @@
-"""Value numbering: expressions get numbers, and equal numbers mean equal values."""
+"""Value numbering: expressions get numbers, and equal numbers mean equal values.
+
+Of a condition and its negation one is the other's base, so that both have one number.
+"""
 
 from __future__ import annotations
 
@@ -13,19 +16,32 @@ from scenicq.forest.nodes import (
     CompareOp,
     Constant,
     Coordinate,
+    DirectionAt,
     Feature,
     Intersects,
     Logic,
+    LogicOp,
     Node,
     Norm,
     Scale,
+    Undefined,
     Value,
     VectorSum,
 )
 from scenicq.forest.walk import children, is_leaf, postorder
+from scenicq.geometry.fields import VectorField
 from scenicq.geometry.regions import DifferenceOf, IntersectionOf, UnionOf
 
-__all__ = ["ValueNumbers", "parts_of"]
+__all__ = ["ValueNumbers", "is_total", "parts_of", "without_negation"]
+
+_NEGATED = {CompareOp.GE: CompareOp.LT, CompareOp.GT: CompareOp.LE, CompareOp.NE: CompareOp.EQ}
+"""Comparisons as the negation of another one, where both sides have a value."""
+_TOTAL = {
+    ArithmeticOp.ADD, ArithmeticOp.SUB, ArithmeticOp.MUL, ArithmeticOp.NEG, ArithmeticOp.ABS, ArithmeticOp.MIN,
+    ArithmeticOp.MAX, ArithmeticOp.SIN, ArithmeticOp.COS, ArithmeticOp.ATAN, ArithmeticOp.ATAN2, ArithmeticOp.FLOOR,
+    ArithmeticOp.CEIL, ArithmeticOp.WRAP,
+}  # fmt: skip
+"""Operations that have a value for all numbers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,16 +54,17 @@ class ValueNumbers:
         """The number of anything that is told apart by equality."""
         return self._numbers.setdefault(form, len(self._numbers))
 
-    def expression(self, root: Node, swap: Mapping[int, int] | None = None) -> int:
+    def expression(self, root: Node, swap: Mapping[int, int] | None = None, known: dict[int, int] | None = None) -> int:
         """The number of an expression; random variables stay themselves.
 
         Args:
             root: The expression.
             swap: The objects that are put for others, by index.
+            known: The numbers of nodes, by their ids, with the same exchange; takes those that are found.
         """
-        numbers: dict[int, int] = {}
+        numbers: dict[int, int] = {} if known is None else known
         swap = swap or {}
-        for node in postorder([root]):
+        for node in postorder([root], beyond=numbers):
             below = [numbers[id(child)] for child in children(node)]
             own: Hashable = None
             match node:
@@ -86,6 +103,35 @@ def parts_of(value: Value) -> Hashable:
             return value.base, value.removed
         case _:
             return value
+
+
+def without_negation(condition: Node) -> tuple[Node, bool]:
+    """A condition without negations, and whether it is meant rather than its negation; it has a value (`is_total`)."""
+    positive = True
+    while isinstance(condition, Logic) and condition.op is LogicOp.NOT:
+        (condition,) = condition.args
+        positive = not positive
+    if isinstance(condition, Compare):
+        left, right, op = condition.left, condition.right, condition.op
+        if op in _NEGATED:
+            op, positive = _NEGATED[op], not positive
+        if op is CompareOp.LE:  # a <= b is not b < a
+            left, right, op, positive = right, left, CompareOp.LT, not positive
+        condition = Compare(op, left, right)
+    return condition, positive
+
+
+def is_total(node: Node) -> bool:
+    """Whether a node has a value whenever those below it that matter have one."""
+    match node:
+        case Arithmetic():
+            return node.op in _TOTAL
+        case Constant():
+            return not isinstance(node.value, Undefined)
+        case DirectionAt(field=Constant(value=VectorField() as field)):
+            return field.reach is None
+        case _:
+            return not isinstance(node, DirectionAt)
 
 
 def _is_difference(node: Node) -> bool:

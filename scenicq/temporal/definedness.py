@@ -29,35 +29,17 @@ from scenicq.forest.nodes import (
     Select,
     Undefined,
 )
+from scenicq.forest.value_numbers import is_total
 from scenicq.forest.walk import children, postorder
 from scenicq.geometry.fields import VectorField
 from scenicq.geometry.regions import PolygonSet
 from scenicq.temporal.folding import folded
 
-__all__ = ["is_total", "untrue"]
+__all__ = ["untrue"]
 
-_TOTAL = {
-    ArithmeticOp.ADD, ArithmeticOp.SUB, ArithmeticOp.MUL, ArithmeticOp.NEG, ArithmeticOp.ABS, ArithmeticOp.MIN,
-    ArithmeticOp.MAX, ArithmeticOp.SIN, ArithmeticOp.COS, ArithmeticOp.ATAN, ArithmeticOp.ATAN2, ArithmeticOp.FLOOR,
-    ArithmeticOp.CEIL, ArithmeticOp.WRAP,
-}  # fmt: skip
-"""Operations that have a value for all numbers."""
 _LARGEST_EXPONENT = 709.0
 """The largest whole exponent to which e has a finite value."""
 _NEVER, _ALWAYS = Constant(False), Constant(True)
-
-
-def is_total(node: Node) -> bool:
-    """Whether a node has a value whenever those below it that matter have one."""
-    match node:
-        case Arithmetic():
-            return node.op in _TOTAL
-        case Constant():
-            return not isinstance(node.value, Undefined)
-        case DirectionAt(field=Constant(value=VectorField() as field)):
-            return field.reach is None
-        case _:
-            return not isinstance(node, DirectionAt)
 
 
 def untrue(condition: Node) -> Node | None:

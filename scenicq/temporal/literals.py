@@ -5,15 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from scenicq.forest.nodes import Compare, CompareOp, Logic, LogicOp, Node
-from scenicq.forest.value_numbers import ValueNumbers
+from scenicq.forest.nodes import Node
+from scenicq.forest.value_numbers import ValueNumbers, is_total, without_negation
 from scenicq.forest.walk import postorder
-from scenicq.temporal.definedness import is_total
 
 __all__ = ["Literal", "literals_of"]
-
-_NEGATED = {CompareOp.GE: CompareOp.LT, CompareOp.GT: CompareOp.LE, CompareOp.NE: CompareOp.EQ}
-"""Comparisons as the negation of another one, where both sides have a value."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,23 +35,9 @@ def literals_of(conditions: Sequence[Node]) -> tuple[Literal, ...]:
     found: list[Literal] = []
     for atom, condition in enumerate(conditions):
         # without a value neither a condition nor its negation holds
-        root, positive = _base(condition) if all(map(is_total, postorder([condition]))) else (condition, True)
+        root, positive = (
+            without_negation(condition) if all(map(is_total, postorder([condition]))) else (condition, True)
+        )
         known = first.setdefault(numbers.expression(root), Literal(atom, positive))
         found.append(Literal(known.atom, known.positive == positive))
     return tuple(found)
-
-
-def _base(condition: Node) -> tuple[Node, bool]:
-    """A condition without negations, and whether it is meant rather than its negation."""
-    positive = True
-    while isinstance(condition, Logic) and condition.op is LogicOp.NOT:
-        (condition,) = condition.args
-        positive = not positive
-    if isinstance(condition, Compare):
-        left, right, op = condition.left, condition.right, condition.op
-        if op in _NEGATED:
-            op, positive = _NEGATED[op], not positive
-        if op is CompareOp.LE:  # a <= b is not b < a
-            left, right, op, positive = right, left, CompareOp.LT, not positive
-        condition = Compare(op, left, right)
-    return condition, positive

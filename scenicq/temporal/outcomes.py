@@ -7,6 +7,7 @@ matches the scenario of one of them.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
@@ -22,6 +23,7 @@ from scenicq.limits import LIMITS
 from scenicq.match.problem.conditioned import options_of
 from scenicq.match.verdict import WitnessValue
 from scenicq.temporal.hidden import has_cuts
+from scenicq.temporal.literals import literals_of
 from scenicq.temporal.samples import MOVING
 
 __all__ = ["Outcome", "outcomes_of", "place_of", "steady_value"]
@@ -107,7 +109,8 @@ def _from_the_start(scenario: Scenario) -> Scenario:
     """The scenario with requirements on its first sample among those over time, where both hang on a hidden number.
 
     What both say of the number is then decided together, exactly. The initial scene may leave these requirements out
-    where nothing else in it hangs on the numbers.
+    where nothing else in it hangs on the numbers. Where both say the same condition or its negation, they come out
+    together, too, even where nothing observes what the condition reads.
     """
     dynamics = scenario.dynamics
     if dynamics is None:
@@ -119,15 +122,19 @@ def _from_the_start(scenario: Scenario) -> Scenario:
     hidden = {leaf.identity for leaf in leaves(*map(written_out, dynamics.conditions))}
     nodes, requirements = list(dynamics.conditions), list(dynamics.requirements)
     left: list[Requirement] = []
+    shared = set(map(id, _shared(scenario)))
     for each in scenario.requirements:
         read = {index for index, _ in features(each.condition)}
         plain = each.built_in is None and PARAMS not in read
         noisy = any(scenario.objects[index].mutated for index in read if index != PARAMS)
         said = written_out(each.condition) if plain and not noisy else each.condition
         own = {leaf.identity for leaf in leaves(said)}
-        if each.span is None or not (plain and not noisy and own and own <= hidden and has_cuts(said)):
+        cuts = bool(own) and own <= hidden and has_cuts(said)
+        if each.span is None or not plain or noisy or not (cuts or id(each) in shared):
             left.append(each)
             continue
+        if not cuts:
+            left.append(each)
         requirements.append(TemporalRequirement(Atom(len(nodes)), each.span))
         nodes.append(transform(each.condition, _at_sample))
     over_time = replace(dynamics, conditions=tuple(nodes), requirements=tuple(requirements))
@@ -135,6 +142,15 @@ def _from_the_start(scenario: Scenario) -> Scenario:
     still = {leaf.identity for leaf in leaves(*roots_of(without))}
     needed = scenario.requirements if still & hidden else tuple(left)
     return replace(scenario, requirements=needed, dynamics=over_time)
+
+
+def _shared(scenario: Scenario) -> list[Requirement]:
+    """The requirements on the first sample, nothing of them random, that are a condition over time or its negation."""
+    conditions = () if scenario.dynamics is None else scenario.dynamics.conditions
+    known = [each for each in scenario.requirements if not leaves(each.condition)]
+    literals = literals_of([*conditions, *(transform(each.condition, _at_sample) for each in known)])
+    alike = Counter(literal.atom for literal in literals)
+    return [each for each, own in zip(known, literals[len(conditions) :], strict=True) if alike[own.atom] > 1]
 
 
 def _at_sample(node: Node) -> Node:

@@ -65,6 +65,32 @@ def test_what_is_sure_holds_for_all_completions_and_what_is_impossible_for_none(
         assert value(possible, known) or completions == {False}
 
 
+def repeated(chance: random.Random, depth: int):
+    """A condition of a few comparisons, asked for and denied again and again."""
+    if depth == 0:
+        one = build.compare(chance.choice((CompareOp.LT, CompareOp.GE)), UNSEEN[chance.random() < 0.5], SEEN[0])
+        one = chance.choice((one, build.compare(CompareOp.GT, SEEN[0], one.left)))
+        return build.opposite(one) if chance.random() < 0.3 else one
+    parts = [repeated(chance, depth - 1) for _ in range(2)]
+    if chance.random() < 0.2:
+        return build.compare(chance.choice((CompareOp.EQ, CompareOp.NE)), *parts)
+    if chance.random() < 0.2:
+        return Select(parts[0], (parts[1], repeated(chance, depth - 1)))
+    return build.logic(chance.choice((LogicOp.AND, LogicOp.OR)), *parts)
+
+
+@pytest.mark.parametrize("seed", range(200))
+@pytest.mark.one_in(4)
+def test_what_is_asked_for_twice_is_told_exactly(seed):
+    root = repeated(random.Random(seed), 3)
+    known = {(0, "a"): 1.0, (0, "b"): 0.0}
+    completions = {
+        value(root, known | {(1, "u"): u, (1, "v"): v}) for u, v in itertools.product((0.0, 1.0, 2.0), repeat=2)
+    }
+    found = {value(each, known) for each in certain_and_possible(root, unobserved)}
+    assert found == completions
+
+
 @pytest.mark.parametrize(
     ("condition_", "sure", "possible"),
     [

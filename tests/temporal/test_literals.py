@@ -56,3 +56,43 @@ def test_what_has_no_value_satisfies_neither(folder):
     """Of what is not seen not even that it has a value is known."""
     one = "1 / a.position.x > 4"
     assert verdicts(folder, f"require next (({one}) or not ({one}))\n")["r-0", "r-2"] == "Unknown"
+
+
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory):
+    """A recording of one label, so that nothing tells how fast anything is."""
+    folder = tmp_path_factory.mktemp("alone") / "d"
+    write_dataset(folder, [recording_of("r", [Sample(0.0, {"ego": (0.0, 0.0), "t": (1.0, 3.0)})])], {}, name="d")
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("start", "over_time", "expected"),
+    [
+        ("a.speed > 4", "always not (a.speed > 4)", {}),
+        ("a.speed > 4", "always (4 >= a.speed)", {}),
+        ("not (a.speed > 4)", "eventually (a.speed > 4)", {}),
+        ("a.speed > 4", "always (4 < a.speed)", {("r-0", "r-0"): "Unknown"}),
+        ("a.speed > 4", "always (a.speed < 9)", {("r-0", "r-0"): "Unknown"}),
+        ("a.speed > 4", "(always (a.speed > 4)) or (always (a.position.x > 0))", {("r-0", "r-0"): "Unknown"}),
+    ],
+)
+def test_the_start_and_what_follows_say_the_same_of_one_label(alone, start, over_time, expected):
+    assert verdicts(alone, f"require {start}\nrequire {over_time}\n") == expected
+
+
+@pytest.mark.parametrize(
+    ("condition", "expected"),
+    [
+        ("(a.speed > 4) or not (a.speed > 4)", "Match"),
+        ("(a.speed > 4) or (4 >= a.speed)", "Match"),
+        ("((a.speed > 4) and (a.position.x > 0)) or not (a.speed > 4)", "Match"),
+        ("(a.speed > 4) and not (a.speed > 4)", None),
+        ("(a.speed > 4) == (a.speed > 4)", "Match"),
+        ("(a.speed > 4) or (a.speed < 3)", "Unknown"),
+    ],
+)
+@pytest.mark.parametrize("form", ["require {}\nrequire always True\n", "require always ({})\n"])
+def test_one_condition_says_the_same_of_what_it_reads_twice(alone, form, condition, expected):
+    found = verdicts(alone, form.format(condition))
+    assert set(found.values()) == ({expected} if expected else set())
