@@ -11,7 +11,8 @@ all means that none was found in time, nor the first one in "first" seconds, whe
 "witness": values, "labels": objects, "seconds": limit} asks whether the program allows them, see `replay_witness`.
 {"points": how many, "seed": number} and {"elements": points of each, "seed": number} ask the network, see
 `map_answers`. With --as-decided Scenic does what scenicq means to do otherwise, so that all that hangs on it can be
-compared: there is a direction of traffic off the road, and views wider than 120 degrees are whole.
+compared: there is a direction of traffic off the road, views wider than 120 degrees are whole, and the ends of a random
+line are known to be oriented points.
 """
 
 from __future__ import annotations
@@ -34,7 +35,8 @@ import shapely
 from map_answers import at_points, of_elements
 from network_features import features_of
 from patience import OutOfPatienceError, patience
-from scenic.core.distributions import RejectionException
+from scenic.core import object_types
+from scenic.core.distributions import AttributeDistribution, RejectionException, distributionFunction
 from scenic.core.errors import InvalidScenarioError
 from scenic.core.regions import SectorRegion
 from scenic.core.type_support import toVector
@@ -109,6 +111,15 @@ def _sector(center: Any, radius: float, heading: float, angle: float, resolution
         return circle
     rim = [center.offsetRadially(2 * radius, heading + turn) for turn in np.linspace(-angle / 2, angle / 2, 33)]
     return circle & shapely.Polygon([(each.x, each.y) for each in (center, *rim)])
+
+
+TYPE_OF_ATTRIBUTE = AttributeDistribution.inferType
+
+
+def _type_of_attribute(owner: Any, attribute: str) -> Any:
+    """As Scenic's own, which does not know what the ends of lines are."""
+    found = TYPE_OF_ATTRIBUTE(owner, attribute)
+    return object_types.OrientedPoint if found in (object, None) and attribute in ("start", "end") else found
 
 
 PARSE, COMPILE = scenic.syntax.translator.parse_string, scenic.syntax.translator.compileScenicAST
@@ -192,7 +203,8 @@ def main(arguments: list[str]) -> None:
     if "--as-decided" in arguments:
         Network._defaultRoadDirection = _road_direction
         VectorField.followFrom = _follow
-        SectorRegion._makePolygons = staticmethod(_sector)
+        AttributeDistribution.inferType = staticmethod(_type_of_attribute)
+        SectorRegion._makePolygons = staticmethod(distributionFunction(_sector))
     Network.fromFile = functools.cache(Network.fromFile)  # one map for all programs
     network = Network.fromFile(str(chart))
     collection = {"type": "FeatureCollection", "features": features_of(network)}

@@ -189,8 +189,6 @@ class Judge:
     def replayed(self, town: Town, text: str, matcher: Matcher, moved: dict[str, Any], match: Match) -> Finding:
         """Whether Scenic allows a displaced scene, given the witness."""
         witness = {key.removeprefix("random:"): value for key, value in match.witness.items()}
-        if "mutate" in text or not all(_PLACE.fullmatch(key) for key in witness):
-            return Finding("open", "a loop, a default or noise is random", moved)
         label, objects = label_of(moved, 0), matcher.scenario.objects
         ids = [match.correspondence[each.name] for each in objects]
         first = next(number for number, each in enumerate(objects) if each.name == "ego")
@@ -201,15 +199,10 @@ class Judge:
         return Finding({"refuted": "wrongly matched"}.get(what, what), why + f" {dict(match.witness)}", moved)
 
 
-_PLACE = re.compile(r"\d+:\d+")
-
-
 def excuse(text: str, scene: dict[str, Any], why: str = "") -> str:
     """The known difference that may keep a scene from matching, or nothing; `why` is what ours refuses."""
     if why.startswith("wrong-value") and "must be positive" in why:
         return "size that is not positive"
-    if re.search(r"(?:left of|right of|ahead of|behind) Uniform\(.*centerline\.(?:start|end)\b", text):
-        return "side of the end of a random line"
     if re.search(r"Point on (?:ego|o\d+)\b", text) and "distance" in text:
         return "height of a point on an object"
     if "mutate" in text and "require" in text.replace("with requireVisible", ""):

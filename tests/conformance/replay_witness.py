@@ -6,9 +6,10 @@ out with all other objects where the label has them. Random variables are found 
 
 from __future__ import annotations
 
+import itertools
 import math
 import sys
-from collections.abc import Generator
+from collections.abc import Generator, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -28,6 +29,7 @@ from scenic.core.vectors import Orientation, Vector
 
 LEAVES = (DiscreteRange, Normal, Options, Range, TruncatedNormal, PointInRegionDistribution)
 SAMPLES = 5
+MOST_ORDERS = 24
 SLACK_M, SLACK_RAD = 0.35, math.radians(3.0)
 """How far from the label Scenic may put an object: known places of others are the program's here, the label's there."""
 
@@ -67,12 +69,55 @@ def replay(scenario: Any, found: dict[tuple[int, int], list[Any]], request: dict
         found: Its random variables by place.
         request: "witness", numbers and points by `line:column`, and "labels", one for each object, the ego first.
     """
-    why = _fix(found, request["witness"])
+    # which of the points are those of the witness is not known: they may be any that can lie there
+    orders = itertools.islice(_orders(found, request["witness"]), MOST_ORDERS)
+    answers = [_replay(scenario, found, request, points) for points in orders]
+    return next((each for each in answers if each["replay"] == "allowed"), None) or min(
+        answers, key=lambda each: each["replay"] == "refuted", default={"replay": "open", "why": "random points"}
+    )
+
+
+def _orders(found: dict[tuple[int, int], list[Any]], witness: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    """The random points that those of a witness may be; Scenic does not say where in the program they are made."""
+    points = [each for made in found.values() for each in made if isinstance(each, PointInRegionDistribution)]
+    keys = [key for key, value in witness.items() if isinstance(value, list)]
+    keys.sort(key=lambda key: (not _in_program(key), _place_of(key)))
+    for order in itertools.permutations(points, len(keys)):
+        if all(_may_be(point, witness[key]) for key, point in zip(keys, order, strict=True)):
+            yield dict(zip(keys, order, strict=True))
+
+
+def _in_program(key: str) -> bool:
+    return key.count(":") == 1
+
+
+def _place_of(key: str) -> tuple[int, int]:
+    """The line and column of a random variable."""
+    line, column = key.split(":")[-2:]
+    return int(line), int(column)
+
+
+def _may_be(point: Any, place: list[float]) -> bool:
+    try:
+        return needsSampling(point.region) or point.region.distanceTo(Vector(*place, 0)) <= SLACK_M
+    except NotImplementedError:
+        return True
+
+
+def _replay(
+    scenario: Any, found: dict[tuple[int, int], list[Any]], request: dict[str, Any], points: dict[str, Any]
+) -> dict[str, str]:
+    for each in (each for made in found.values() for each in made):
+        each._conditioned = each
+    why = _fix(found, request["witness"], points)
     if why:
         return {"replay": "open", "why": why}
+    others = any(not _in_program(key) or _place_of(key) not in found for key in request["witness"])
     labels = request["labels"]
     own = [_Conditioned(thing, label) for thing, label in zip(scenario.objects, labels, strict=True)]
     for number, each in enumerate(own):
+        if each.is_noisy:
+            continue  # its noise may bring it anywhere
         for other in own:
             other.observe()
         each.forget()
@@ -80,7 +125,7 @@ def replay(scenario: Any, found: dict[tuple[int, int], list[Any]], request: dict
         if not any(far <= SLACK_M and turn <= SLACK_RAD for far, turn in apart):
             varies = len({(round(far, 4), round(turn, 4)) for far, turn in apart}) > 1
             why = f"object {number} is {apart[0][0]:.2f} m and {math.degrees(apart[0][1]):.1f} deg from its label"
-            return {"replay": "open" if varies else "refuted", "why": why}
+            return {"replay": "open" if varies or others else "refuted", "why": why}
     for each in own:
         each.observe()
     try:
@@ -101,6 +146,11 @@ class _Conditioned:
         self.values = [(getattr(thing, name), value) for name, value in given.items()]
         self.values = [(each, value) for each, value in self.values if needsSampling(each)]
         self.before = [each._conditioned for each, _ in self.values]
+
+    @property
+    def is_noisy(self) -> bool:
+        """Whether the program mutates it."""
+        return bool(self.thing.mutationScale)
 
     def observe(self) -> None:
         """What others refer to is where the label has it."""
@@ -124,23 +174,21 @@ class _Conditioned:
         return far, abs(math.remainder(off, math.tau))
 
 
-def _fix(found: dict[tuple[int, int], list[Any]], witness: dict[str, Any]) -> str:
+def _fix(found: dict[tuple[int, int], list[Any]], witness: dict[str, Any], points: dict[str, Any]) -> str:
     """Let random variables have the values of a witness; what keeps it from that."""
-    points = [each for made in found.values() for each in made if isinstance(each, PointInRegionDistribution)]
-    keys = sorted((tuple(map(int, key.split(":"))) for key, value in witness.items() if isinstance(value, list)))
-    if len(points) != len(keys):
-        return f"{len(points)} random points, {len(keys)} of which are known"
-    in_order = dict(zip(keys, points, strict=True))  # Scenic does not say where in the program they are made
     for key, value in witness.items():
-        line, column = map(int, key.split(":"))
-        made, point = found.get((line, column), []), isinstance(value, list)
-        if point:
-            made = [in_order[line, column]]
+        if key in points:
+            points[key].conditionTo(ConstantSamplable(Vector(*value, 0)))
+            continue
+        made = found.get(_place_of(key), []) if _in_program(key) else []
+        indices = {id(each.index) for each in made if isinstance(each, Options)}
+        made = [each for each in made if not isinstance(each, PointInRegionDistribution) and id(each) not in indices]
+        if not made:
+            continue  # a choice that Scenic does not have
         if len(made) != 1:
-            return f"{len(made)} random variables at {key}"
+            return f"{len(made)} random variables at {key}: {[type(each).__name__ for each in made]}"
         variable = made[0].index if isinstance(made[0], Options) else made[0]
         if not isinstance(variable, Samplable):
             return f"no random choice at {key}"
-        known = Vector(*value, 0) if point else int(value) if isinstance(made[0], Options) else value
-        variable.conditionTo(ConstantSamplable(known))
+        variable.conditionTo(ConstantSamplable(int(value) if isinstance(made[0], Options) else value))
     return ""
