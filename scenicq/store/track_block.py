@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,12 +18,36 @@ from scenicq.store.dataset import Dataset
 from scenicq.store.row_columns import RowColumns
 from scenicq.store.tracks import TrackKey
 
-__all__ = ["TrackBlock"]
+__all__ = ["TrackBlock", "TrackReach", "in_order"]
 
 Numbers = NDArray[np.float64]
 Integers = NDArray[np.int64]
+_LONG = 500
+"""Labels of a recording of which no more is read than is asked about."""
 _CODED = ("class", "attributes")
 """Columns of texts, of objects and egos, that are read as numbers of distinct ones."""
+
+
+def in_order(numbers: Integers) -> Integers:
+    """The places of numbers that are not negative, in the order of these, equal ones as they stand."""
+    # sorting is faster than finding the order
+    size = max(len(numbers), 1)
+    return np.sort(numbers * size + np.arange(len(numbers))) % size
+
+
+@dataclass(frozen=True, slots=True)
+class TrackReach:
+    """How much of a track is asked about.
+
+    Attributes:
+        after_s: Up to the first label so many seconds after an object that is asked about.
+        gap_s: Seconds without a label after which a track's life ends; what is seen so long after that tells.
+        gaps: Whether labels in which it is not seen are asked about: then all of a track that has some is.
+    """
+
+    after_s: float
+    gap_s: float
+    gaps: bool = False
 
 
 class TrackBlock:
@@ -44,8 +69,9 @@ class TrackBlock:
     """
 
     def __init__(
-        self, dataset: Dataset, part: int, runs: Sequence[tuple[int, int]], rows: Integers | None = None
-    ) -> None:
+        self, dataset: Dataset, part: int, runs: Sequence[tuple[int, int]], rows: Integers | None = None,
+        reach: TrackReach | None = None,
+    ) -> None:  # fmt: skip
         """Open the files and read what all columns are about.
 
         Args:
@@ -53,6 +79,7 @@ class TrackBlock:
             part: Number of the part.
             runs: Rows of the labels of each recording in their part, the last left out; in order.
             rows: Rows of label objects in their part, in order, whose tracks are asked about; None for all tracks.
+            reach: How much of these tracks is asked about; None for all of it.
         """
         self._labels = RowColumns(dataset.files("labels")[part], [f"ego_{name}" for name in _CODED])
         self._objects = RowColumns(dataset.files("objects")[part], [*_CODED, "track"])
@@ -65,29 +92,30 @@ class TrackBlock:
         first_object = int(self._labels.integers("first_object", self._label_rows[:1])[0])
         self._named: tuple[NDArray[np.int64], list[str]] | None = None
         starts: Integers = first_object + np.concatenate(([0], np.cumsum(counts)))
-        self._rows: Integers = (
-            np.arange(first_object, int(starts[-1])) if rows is None else self._track_rows(starts, rows)
-        )
+        self.recording_of: Integers = np.full(n, -1)
+        for number, (first, end) in enumerate(self.runs):
+            self.recording_of[first:end] = number
+        self._rows: Integers = np.arange(first_object, int(starts[-1]))
+        if rows is not None:
+            self._rows = self._track_rows(starts, rows, reach)
         self.object_starts: Integers = np.searchsorted(self._rows, starts)
         self.object_count = len(self._rows)
         self.size = self.object_count + n
         self.label_of: Integers = np.concatenate(
             (np.repeat(np.arange(n), np.diff(self.object_starts)), np.arange(n), [-1])
         )
-        self.recording_of: Integers = np.full(n, -1)
-        for number, (first, end) in enumerate(self.runs):
-            self.recording_of[first:end] = number
         self._numbers: dict[str, Numbers] = {}
         self._said: tuple[NDArray[np.int64], list[Mapping[str, Any]]] | None = None
         self._categories: tuple[NDArray[np.int64], list[str]] | None = None
         self._tracks: Integers | None = None
 
-    def _track_rows(self, starts: Integers, rows: Integers) -> Integers:
-        """The rows of all label objects of the tracks of some.
+    def _track_rows(self, starts: Integers, rows: Integers, reach: TrackReach | None) -> Integers:
+        """The rows of the label objects of the tracks of some, as far as they are asked about.
 
         Args:
             starts: The row with which the objects of each label begin, and behind the last one's.
             rows: Some rows in order.
+            reach: How far that is.
         """
         first = int(starts[0])
         codes, names = self._objects.codes("track", np.arange(first, int(starts[-1])))
@@ -105,8 +133,66 @@ class TrackBlock:
                 chosen[begin:end] |= wanted[codes[begin:end]]
                 wanted[mine] = False
         found = np.flatnonzero(chosen)
+        if reach is not None:
+            asked = np.zeros(len(codes), np.bool_)
+            asked[rows - first] = True
+            label = np.searchsorted(starts - first, found, side="right") - 1
+            track = self.recording_of[label] * (len(names) + 1) + codes[found]
+            found = found[self._within_reach(track, label, asked[found], reach)]
         self._named = codes[found].astype(np.int64), names
         return first + found
+
+    def _within_reach(
+        self, track: Integers, label: Integers, asked: NDArray[np.bool_], reach: TrackReach
+    ) -> NDArray[np.bool_]:
+        """Which of some label objects are within reach of those of their tracks that are asked about.
+
+        Those between are, too, where a track would seem not to be seen for a while that does not end its life.
+
+        Args:
+            track: The number of the track of each.
+            label: The label of each, in order.
+            asked: Which are asked about.
+            reach: How far.
+        """
+        lengths = np.array([end - first for first, end in self.runs])
+        long = np.flatnonzero((lengths > _LONG)[self.recording_of[label]])
+        found = np.ones(len(track), np.bool_)
+        if not len(long):
+            return found
+        order = long[in_order(track[long])]
+        places, own, time = np.arange(len(order)), asked[order], self.times_us[label[order]]
+        heads = np.append(True, np.diff(track[order]) != 0)
+        before = np.maximum.accumulate(np.where(own | heads, places, 0))
+        lasts = np.append(heads[1:], True)
+        after = np.minimum.accumulate(np.where(own | lasts, places, len(order))[::-1])[::-1]
+        gap_us = round(reach.gap_s * 1e6)
+        last = self.labels_after(np.arange(len(self)), reach.after_s)
+        ends = np.append(self.times_us, np.iinfo(np.int64).max - gap_us)[last]
+        end = ends[label[order][before]] + gap_us
+        near = own[before] & ((time <= end) | (own[after] & (time[after] - end <= gap_us)))
+        if reach.gaps:
+            number = np.cumsum(heads) - 1
+            unseen = ~heads & (np.diff(label[order], prepend=-1) > 1)
+            near |= (np.bincount(number, unseen) > 0)[number]
+        found[order] = near
+        return found
+
+    def labels_after(self, labels: Integers, time_s: float) -> Integers:
+        """The first label of the same recording that is at least so many seconds after some; behind all if none is.
+
+        Args:
+            labels: The labels.
+            time_s: The seconds, of which a millionth may be missing.
+        """
+        time_us, first_us = round(min(time_s, 1e6) * 1e6), int(self.times_us.min(initial=0))
+        known = np.flatnonzero(self.recording_of >= 0)
+        # whole numbers that grow from label to label
+        whole = int(self.times_us.max(initial=0)) - first_us + time_us + 2
+        time = self.times_us - first_us + self.recording_of * whole
+        found = np.append(known, len(self))[np.searchsorted(time[known], time[labels] + time_us - 1)]
+        other = np.append(self.recording_of, -1)[found] != self.recording_of[labels]
+        return np.where(other, len(self), found)
 
     def __enter__(self) -> TrackBlock:
         """It is open."""

@@ -20,9 +20,11 @@ from scenicq.errors import Span
 from scenicq.forest.condition import expand
 from scenicq.forest.nodes import Node
 from scenicq.forest.scenario import Scenario
+from scenicq.forest.walk import features
 from scenicq.match.options import MatchOptions
 from scenicq.match.verdict import WitnessValue
 from scenicq.smt.answer import Solver
+from scenicq.store.track_block import TrackReach
 from scenicq.store.tracks import TrackKey
 from scenicq.temporal.atoms import AtomColumns, reads_start
 from scenicq.temporal.hidden import random_variables
@@ -32,6 +34,7 @@ from scenicq.temporal.outcomes import Outcome, outcomes_of, steady_value
 from scenicq.temporal.presence import by_presence
 from scenicq.temporal.run_lanes import follow_runs
 from scenicq.temporal.run_machine import RunMachine
+from scenicq.temporal.samples import MOVING
 from scenicq.temporal.selection import chosen
 from scenicq.temporal.stretches import StartTable, Stretches, stretches_of
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
@@ -157,6 +160,17 @@ class IntervalMatcher:
     def __post_init__(self) -> None:
         """Split off the choices."""
         self.outcomes = outcomes_of(self.scenario)
+
+    @property
+    def reach(self) -> TrackReach | None:
+        """How much of the tracks of starts matters; None for all that follows."""
+        dynamics = self.scenario.dynamics
+        if dynamics is None:
+            return TrackReach(0.0, self.options.gap_s, gaps=True)
+        times = [each.after_s for each in dynamics.terminations if each.after_s is not None]
+        # of what does not change, one observation anywhere counts
+        moving = all(name in MOVING for _, name in features(*dynamics.conditions))
+        return TrackReach(min(times), self.options.gap_s) if times and moving else None
 
     def intervals(self, table: StartTable, remember: Callable[[int], Remembered], *, every: bool = True) -> Reported:
         """What became of each binding: the intervals to report, or else the one that came furthest.

@@ -30,12 +30,11 @@ from scenicq.forest.nodes import (
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.temporal import Atom
 from scenicq.forest.walk import features, postorder
-from scenicq.store.track_block import TrackBlock
+from scenicq.store.track_block import TrackBlock, in_order
 from scenicq.temporal.atoms import AtomColumns, reads_start
 from scenicq.temporal.first_exits import next_at
 from scenicq.temporal.hidden import possibly
 from scenicq.temporal.required import Required
-from scenicq.temporal.runs import SLACK_S
 from scenicq.temporal.samples import MOVING, BoundSamples
 from scenicq.temporal.starts import RoleCandidates, narrowed
 from scenicq.temporal.truth import FALSE, Truth
@@ -142,7 +141,7 @@ class NecessaryConditions:
         first = next_at(holds)[at]
         met = first <= tracks.last[at]
         if self.within_s is not None:
-            due = _labels_after(block, block.label_of[members], self.within_s)
+            due = block.labels_after(block.label_of[members], self.within_s)
             met &= block.label_of[tracks.order[np.minimum(first, len(tracks.order) - 1)]] <= due
         # where a track is not seen, the condition may hold
         return met | tracks.gaps[at]
@@ -169,9 +168,7 @@ class _Tracks:
         """Those of a block."""
         m = block.object_count
         tracks = block.tracks(np.arange(m))
-        # sorting is faster than finding the order
-        ordered = np.sort(tracks * m + np.arange(m))
-        order = ordered % max(m, 1)
+        order = in_order(tracks)
         place = np.empty(m, np.int64)
         place[order] = np.arange(m)
         ends = np.append(np.diff(tracks[order]) != 0, True)[:m]
@@ -188,13 +185,3 @@ def _without(may: NDArray[np.bool_], which: NDArray[np.int64]) -> NDArray[np.boo
     found = may.copy()
     found[which] = False
     return found
-
-
-def _labels_after(block: TrackBlock, labels: Members, time_s: float) -> Members:
-    """The first label of the same recording at least so many seconds after some; behind it if there is none."""
-    known = np.flatnonzero(block.recording_of >= 0)
-    # whole numbers that grow from label to label
-    whole = int(block.times_us.max(initial=0) - block.times_us.min(initial=0)) + round(min(time_s, 1e6) * 1e6) + 2
-    time = block.times_us - block.times_us.min(initial=0) + block.recording_of * whole
-    wanted = time[labels] + round(min(time_s, 1e6) * 1e6) - round(SLACK_S * 1e6)
-    return np.append(known, len(block))[np.searchsorted(time[known], wanted)]

@@ -165,7 +165,7 @@ class RecordingMatcher:
         if not len(left.labels):
             return found
         players = None if left.rows is None else left.rows.rows
-        with TrackBlock(self.dataset, rows.part, rows.runs, players) as block:
+        with TrackBlock(self.dataset, rows.part, rows.runs, players, self.intervals.reach) as block:
             labels = left.labels - block.first_label
             candidates = self._candidates(block, labels, left)
             if candidates is not None and self._necessary is not None:
