@@ -6,6 +6,7 @@ No Python is ever executed: every construct is interpreted here, and what is not
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from inspect import signature
 from typing import TYPE_CHECKING, assert_never, cast
 
 from scenicq.compiler import operators
@@ -98,7 +99,7 @@ def call(
                 return function.call(span, *values[: len(args)], **given)
             except TypeError as error:
                 raise fail("wrong-arity", f"`{function.name}` cannot take these arguments", span,
-                           str(error).split(") ", 1)[-1].replace("() ", " ")) from None  # fmt: skip
+                           _told(error, function, span, values[: len(args)], given)) from None  # fmt: skip
 
         values = (*args, *named.values())
         return lift(now, *values, span=span, spread=function.spread) if function.lifted else now(*values)
@@ -111,6 +112,17 @@ def call(
         raise fail("wrong-type", f"`{function.name}` is a class of objects, not a function", span, "called here",
                    (f"give objects their properties by specifiers, as in `{spelled}`",))  # fmt: skip
     raise fail("wrong-type", f"{describe(function)} cannot be called", span, "not a function")
+
+
+def _told(
+    error: TypeError, function: Builtin, span: Span, args: tuple[ModelValue, ...], named: Mapping[str, ModelValue]
+) -> str:
+    """What is wrong with the arguments; where Python itself says it, it counts the place of the call as one."""
+    try:
+        signature(function.call).bind(span, *args, **named)
+    except (TypeError, ValueError) as mismatch:
+        return str(mismatch)
+    return str(error).split(") ", 1)[-1].replace("() ", " ")
 
 
 def _call(run: Interpreter, node: ast.Call, scope: Environment) -> ModelValue:

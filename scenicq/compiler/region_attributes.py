@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
+from inspect import signature
 from itertools import pairwise
 from typing import cast
 
@@ -67,7 +69,14 @@ def _point(value: Node, span: Span) -> Node:
 
 
 def _method(name: str, make: Callable[..., ModelValue], cost: int = 0) -> Callable[[Node], Builtin]:
-    return lambda value: Builtin(name, lambda span, *given: make(value, *given, span), cost=cost)
+    operands = list(signature(make).parameters)[1:-1]
+
+    def call(value: Node, span: Span, *given: ModelValue) -> ModelValue:
+        if len(given) != len(operands):
+            raise TypeError(f"{name}() takes {', '.join(operands) or 'nothing'}")
+        return make(value, *given, span)
+
+    return lambda value: Builtin(name, partial(call, value), cost=cost)
 
 
 REGION_METHODS: dict[str, Callable[[Node], Builtin]] = {
