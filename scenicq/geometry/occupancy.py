@@ -12,7 +12,7 @@ as in these, as in Scenic; here the border is a polygon, so that the plane falls
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TypeAlias
@@ -100,11 +100,7 @@ class Occupancy:
     def at(self, x: float, y: float) -> tuple[int, ...]:
         """The numbers of the options at a point, at least one."""
         known = self._known.get((x, y))
-        if known is None:
-            if len(self._known) >= _KEPT:
-                self._known.clear()
-            known = self._known[x, y] = self._find(x, y)
-        return known
+        return self._find(np.array([[x, y]]), [(x, y)])[0] if known is None else known
 
     def at_many(self, xy: NDArray[np.float64]) -> list[tuple[int, ...]]:
         """`at` for points of shape (n, 2): the same points are asked for once for each rank, and for each condition."""
@@ -113,19 +109,39 @@ class Occupancy:
         if known is None:
             if len(self._known_together) >= _KEPT_TOGETHER:
                 self._known_together.clear()
-            known = self._known_together[key] = [self.at(x, y) for x, y in xy.tolist()]
+            places = [(x, y) for x, y in xy.tolist()]
+            new = [number for number, place in enumerate(places) if place not in self._known]
+            found = dict(zip(new, self._find(xy[new], [places[number] for number in new]), strict=True))
+            known = [found[number] if number in found else self._known[place] for number, place in enumerate(places)]
+            self._known_together[key] = known
         return known
 
-    def _find(self, x: float, y: float) -> tuple[int, ...]:
-        here = shapes.point(x, y)
-        for trees in (self._trees, self._wider_trees):
-            for layer, tree in zip(self.layers, trees, strict=True):
-                hits: list[int] = np.sort(shapes.tree_within(tree, here, SLACK)).tolist()
-                owners = {layer[hit][2]: layer[hit][1] for hit in reversed(hits)}
-                found = [owners[owner] for owner in sorted(owners)]
-                if any(number != self.nothing for number in found):
-                    return tuple(found)
-        return (self.nothing,)
+    def _find(self, xy: NDArray[np.float64], places: Sequence[tuple[float, float]]) -> list[tuple[int, ...]]:
+        """`at` for points (n, 2), which are kept by their places."""
+        found: list[tuple[int, ...]] = [(self.nothing,)] * len(places)
+        left: NDArray[np.intp] = np.arange(len(places), dtype=np.intp)
+        for layer, tree in self._in_turn():
+            if not len(left):
+                break
+            here, hits = shapes.tree_pairs_within(tree, shapes.points(xy[left]), SLACK)
+            options: dict[int, dict[int, int]] = {}
+            # of several areas of one owner the first counts
+            for point, hit in sorted(zip(left[here].tolist(), hits.tolist(), strict=True), reverse=True):
+                _, number, owner = layer[hit]
+                options.setdefault(point, {})[owner] = number
+            for point, numbers in options.items():
+                if any(number != self.nothing for number in numbers.values()):
+                    found[point] = tuple([numbers[owner] for owner in sorted(numbers)])
+            left = left[[found[point] == (self.nothing,) for point in left.tolist()]]
+        if len(self._known) + len(places) > _KEPT:
+            self._known.clear()
+        self._known.update(zip(places, found, strict=True))
+        return found
+
+    def _in_turn(self) -> Iterator[tuple[Layer, STRtree]]:
+        """The layers in the order in which they count, then their surroundings, which most points do not need."""
+        yield from zip(self.layers, self._trees, strict=True)
+        yield from zip(self.layers, self._wider_trees, strict=True)
 
     def near(self, boxes: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
         """Pairs (box, number) that hold every option somewhere in each box, and few more; rows of `Bounds`, (n, 4)."""

@@ -18,6 +18,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from scenicq.query.prefilter.decision import new_table
 from scenicq.query.prefilter.plan import LABELS, MEMBERSHIPS, OBJECTS, PASSED, SENSORS, Plan
 from scenicq.store.dataset import Dataset
 from scenicq.store.sql import sql_text
@@ -236,6 +237,16 @@ def _open(connection: duckdb.DuckDBPyConnection, views: Iterable[tuple[str, str]
         connection.execute(f"CREATE OR REPLACE TEMP VIEW {view} AS {rows}")
 
 
+def _name(connection: duckdb.DuckDBPyConnection, plan: Plan) -> None:
+    """Make the tables of names that a plan reads and a connection does not have: their texts are long."""
+    if not plan.names:
+        return
+    known = {name for (name,) in connection.execute("SELECT table_name FROM duckdb_tables() WHERE temporary").fetchall()}
+    for table, query in plan.names:
+        if table.partition("(")[0] not in known:
+            connection.execute(new_table(table, query))
+
+
 _PART = 1 << 40
 """More rows than a part has."""
 
@@ -334,6 +345,7 @@ def run_plan(
         return missed
     connection.register(PASSED, pa.table({"f": left}))
     _open(connection, chain(asked, views))
+    _name(connection, plan)
     for place, stage in enumerate(plan.stages):
         for statement in stage.statements:
             connection.execute(statement)

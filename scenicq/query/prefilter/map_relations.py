@@ -30,9 +30,8 @@ from scenicq.geometry.occupancy import TOLERANCE, ElementAtPoint, Occupancy
 from scenicq.geometry.regions import Region
 from scenicq.limits import LIMITS
 from scenicq.match.tolerance import SLACK
-from scenicq.query.prefilter.regions import RegionNames, region_ids
+from scenicq.query.prefilter.regions import RegionNames, named, region_ids
 from scenicq.query.prefilter.sql_ends import number
-from scenicq.store.sql import sql_text
 
 __all__ = ["LookUp", "MapRelations", "allowed_elements", "look_up_of", "shared_look_ups"]
 
@@ -126,29 +125,29 @@ class MapRelations:
     ego: int
     _tables: dict[_Table, str] = field(default_factory=dict["_Table", str])
 
-    def queries(self, rows: str, frames: str) -> Iterator[tuple[str, str]]:
+    @property
+    def is_empty(self) -> bool:
+        """Whether no condition asks for a table."""
+        return not self._tables
+
+    def queries(self, rows: str) -> Iterator[tuple[str, str]]:
         """The tables that conditions ask for, each with its query.
 
         Args:
-            rows: The view of memberships.
-            frames: A query of the frames that are wanted, with their numbers `f`.
+            rows: The table of memberships of the ego and whoever may play a role, with the numbers `f` of their frames.
         """
         for table, name in self._tables.items():
-            own = "m.object <> 'ego'" if table.everybody else "m.object = 'ego'"
-            at = (
-                f"SELECT q.f, m.object, m.region, m.distance FROM {rows} m JOIN ({frames}) q ON m.frame = q.frame "
-                f"WHERE {own} AND m.{_AT}"
-            )
+            own = "object <> 'ego'" if table.everybody else "object = 'ego'"
+            at = f"SELECT f, object, region, distance FROM {rows} WHERE {own} AND {_AT}"
             if table.first:
                 at = (
-                    f"SELECT f, object, region FROM ({at}) WHERE region IN {_set(table.first)} "
+                    f"SELECT f, object, region FROM ({at}) WHERE region IN {named(table.first, self.names)} "
                     f"QUALIFY distance = 0 AND count(*) OVER (PARTITION BY f, object) <= {table.most}"
                 )
-            sources, regions = (_list([pair[side] for pair in table.pairs]) for side in (0, 1))
-            relation = f"SELECT unnest({sources}) AS source, unnest({regions}) AS region"
+            relation = self.names.table("source, region", *([pair[side] for pair in table.pairs] for side in (0, 1)))
             yield (
                 name,
-                f"SELECT DISTINCT e.f, e.object, r.region FROM ({at}) e JOIN ({relation}) r ON r.source = e.region",
+                f"SELECT DISTINCT e.f, e.object, r.region FROM ({at}) e JOIN {relation} r ON r.source = e.region",
             )
 
     def may_be_in(self, region: Select, reach: float) -> str | None:
@@ -194,7 +193,7 @@ class MapRelations:
         if found is None or sources is None or found[0].occupancy.nothing in found[1]:
             return None
         ids = sorted({each for layer in sources for each, place in layer if place in found[1]})
-        return found[0].object, f"(region IN {_set(ids)} AND {_AT})"
+        return found[0].object, f"(region IN {named(ids, self.names)} AND {_AT})"
 
     def surely_holds(self, look_up: LookUp, among: Collection[int], most: int) -> str | None:
         """A condition on frames: that one of some elements lies where the ego is, and may be the one that is meant."""
@@ -320,11 +319,3 @@ class _Table:
     most: int
     everybody: bool
 
-
-def _list(ids: Sequence[str]) -> str:
-    return f"[{', '.join(map(sql_text, ids))}]::VARCHAR[]"
-
-
-def _set(ids: Sequence[str]) -> str:
-    # a subquery is hashed, a list is gone through for every row
-    return f"(SELECT unnest({_list(ids)}))"

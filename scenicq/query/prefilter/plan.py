@@ -48,6 +48,7 @@ class Plan:
         columns: A query for the number `f` of each frame and the step `missed` that its columns alone say it misses, -1
             for none. Those that miss none are `PASSED`, and all else is about them.
         stages: How the other steps are decided.
+        names: The query of each table of names of map elements that the stages read, by the table and its columns.
         roles: The objects for which the table `roles` then has a column `r0`, `r1` ...: whether the object in row `row`
             may play them; none where there is nobody but the ego. None if every object of a frame must be looked at.
         decision: SQL that makes the table `decided` of frames that surely match, of those that all stages have left;
@@ -64,6 +65,7 @@ class Plan:
     roles: tuple[int, ...] | None
     decision: tuple[str, ...] = ()
     players: str = ""
+    names: tuple[tuple[str, str], ...] = ()
 
     @property
     def left(self) -> str:
@@ -74,7 +76,10 @@ class Plan:
     def statements(self) -> list[str]:
         """All statements, for people."""
         staged = [statement for stage in self.stages for statement in stage.statements]
-        return [self.players] if self.players else [self.columns, *staged, *self.decision] if staged else []
+        named = [new_table(*each) for each in self.names]
+        if self.players:
+            return [self.players]
+        return [self.columns, *named, *staged, *self.decision] if staged else []
 
     @property
     def sql(self) -> str:
@@ -170,6 +175,7 @@ def make_plan(
         played if own_ego and not options.exact else None,
         () if proofs is None else decision(proofs, played, flags, options, tables=(LABELS, OBJECTS), left=left),
         _players(roles, own, options) if apart else "",
+        tuple(relations.names.tables.items()),
     )
 
 
@@ -300,22 +306,32 @@ def _regions(
         return "narrow"
     flags = [f"bool_or({sql}) AS {name}" for sql, name in (*mine.items(), *others.items(), *wanted.items())]
     left = f"f IN (SELECT f FROM {draft.last} WHERE missed IS NULL)"
-    asked = [f"SELECT f, frame, 'ego' AS object FROM stage0 WHERE {left}"] if mine else []
+    asked: list[str] = []
+    if mine or not relations.is_empty:
+        asked.append(f"SELECT f, frame, 'ego' AS object FROM stage0 WHERE {left}")
     if others:
         placed = " OR ".join(f"n.{name} = {role.full}" for name, role in distinct.items())
         asked.append(
             f"SELECT n.f, {EGO}.frame, n.id AS object FROM narrow n JOIN stage0 {EGO} USING (f) "
             f"WHERE ({placed}) AND n.{left}"
         )
-    statements = [
-        *(new_table(*each) for each in relations.queries(MEMBERSHIPS, f"SELECT f, frame FROM stage0 WHERE {left}")),
+    rows = (
+        f"SELECT q.f, m.object, m.kind, m.region, m.distance FROM {MEMBERSHIPS} m JOIN ({' UNION ALL '.join(asked)}) q "
+        "ON m.frame = q.frame AND m.object = q.object"
+    )
+    statements: list[str] = []
+    if not relations.is_empty:
+        # asked more than once
+        statements.append(new_table("placings", rows))
+        rows = "SELECT * FROM placings"
+        statements += [new_table(*each) for each in relations.queries("placings")]
+    statements.append(
         new_table(
             "flags",
-            f"SELECT q.f, m.object, {', '.join(flags)} FROM {MEMBERSHIPS} m JOIN ({' UNION ALL '.join(asked)}) q "
-            f"ON m.frame = q.frame AND m.object = q.object WHERE {' OR '.join(dict.fromkeys((*mine, *others)))} "
-            "GROUP BY q.f, m.object",
-        ),
-    ]
+            f"SELECT q.f, q.object, {', '.join(flags)} FROM ({rows}) q "
+            f"WHERE {' OR '.join(dict.fromkeys((*mine, *others)))} GROUP BY q.f, q.object",
+        )
+    )
     joined = "LEFT JOIN flags e ON e.f = s.f AND e.object = 'ego'" if mine else ""
     blamed = [
         (f"NOT coalesce(e.{name}, false)", draft.step(each.what, each.span))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+from collections.abc import Sequence
 from functools import cached_property
 
 from scenicq.geometry.network import Network
@@ -11,7 +13,10 @@ from scenicq.match.tolerance import SLACK
 from scenicq.query.prefilter.sql_ends import number
 from scenicq.store.sql import sql_text
 
-__all__ = ["RegionNames", "near_region", "region_ids"]
+__all__ = ["RegionNames", "named", "near_region", "region_ids"]
+
+_FEW = 8
+"""Names that are written out."""
 
 
 class RegionNames:
@@ -19,11 +24,13 @@ class RegionNames:
 
     Attributes:
         kinds: The kinds of map element whose union a region is, by the region's identity.
+        tables: The query of each table of names that conditions ask for. The table's name says what is in it.
     """
 
     def __init__(self, network: Network) -> None:
         """The names for one map."""
         self._network = network
+        self.tables: dict[str, str] = {}
         self.kinds: dict[int, tuple[str, ...]] = {
             id(network.laneRegion): ("lane",),
             id(network.intersectionRegion): ("intersection",),
@@ -32,6 +39,19 @@ class RegionNames:
             id(network.shoulderRegion): ("shoulder",),
             id(network.drivableRegion): ("lane", "road", "intersection", "drivable"),
         }
+
+    def table(self, columns: str, *rows: Sequence[str]) -> str:
+        """The table of some names, which is made once for a connection.
+
+        Args:
+            columns: The names of its columns, `one` or `one, other`.
+            rows: The names in each column, as many in each.
+        """
+        lists = [f"[{', '.join(map(sql_text, column))}]::VARCHAR[]" for column in rows]
+        query = f"SELECT {', '.join(f'unnest({each})' for each in lists)}"
+        name = f"names_{hashlib.blake2b(query.encode(), digest_size=8).hexdigest()}"
+        self.tables[f"{name}({columns})"] = query
+        return name
 
     @cached_property
     def elements(self) -> dict[str, str]:
@@ -105,5 +125,11 @@ def _chosen(area: PolygonSet, names: RegionNames) -> str | None:
     if id(area) in names.kinds:
         return f"kind IN ({', '.join(map(sql_text, names.kinds[id(area)]))})"
     ids = _ids(area, names)
-    # a subquery is hashed, a list is gone through for every row
-    return None if ids is None else f"region IN (SELECT unnest([{', '.join(map(sql_text, ids))}]))"
+    return None if ids is None else f"region IN {named(ids, names)}"
+
+
+def named(ids: Sequence[str], names: RegionNames) -> str:
+    """Some names as the right side of `IN`: a table is hashed, a list is gone through for every row."""
+    if len(ids) <= _FEW:
+        return f"({', '.join(map(sql_text, ids)) or 'NULL'})"
+    return f"(FROM {names.table('region', ids)})"
