@@ -110,9 +110,10 @@ class Occupancy:
             if len(self._known_together) >= _KEPT_TOGETHER:
                 self._known_together.clear()
             places = [(x, y) for x, y in xy.tolist()]
-            new = [number for number, place in enumerate(places) if place not in self._known]
-            found = dict(zip(new, self._find(xy[new], [places[number] for number in new]), strict=True))
-            known = [found[number] if number in found else self._known[place] for number, place in enumerate(places)]
+            before = [self._known.get(place) for place in places]
+            new = [number for number, each in enumerate(before) if each is None]
+            found = iter(self._find(xy[new], [places[number] for number in new]))
+            known = [next(found) if each is None else each for each in before]
             self._known_together[key] = known
         return known
 

@@ -226,7 +226,7 @@ class ConditionReader:
                 case RegionIntersection(parts=parts):
                     todo += reversed(parts)
                 case Select() as looked_up if names is not None:
-                    near = self.relations.may_be_in(looked_up, reach)
+                    near = self.relations.may_be_in(looked_up, reach, self.required)
                     if near is not None:
                         yield near, ""
                 case DiscAt() | SectorAt() as seen:

@@ -20,6 +20,7 @@ from scenicq.forest.nodes import (
     Constant,
     DirectionAt,
     Feature,
+    Identity,
     Index,
     Logic,
     LogicOp,
@@ -47,25 +48,33 @@ class LookUp:
         occupancy: The elements.
         object: The object, by index.
         ranks: Any of so many elements at the place may be meant; where there are more, it is not known which.
+        choice: What chooses among them; None where it is always the same.
     """
 
     occupancy: Occupancy
     object: int
     ranks: int = 1
+    choice: Identity | None = None
 
     def is_like(self, other: LookUp) -> bool:
         """Whether both are of one element."""
         return self.occupancy is other.occupancy and self.object == other.object
 
+    def is_same(self, other: LookUp) -> bool:
+        """Whether both always find the same element."""
+        return self.is_like(other) and self.choice is other.choice
+
 
 def look_up_of(node: Node) -> LookUp | None:
     """The look-up whose number an expression is, whichever of several elements at a place is meant."""
-    ranked = node.options if isinstance(node, Select) and isinstance(node.index, Index) else (node,)
+    ranked, choice = (node,), None
+    if isinstance(node, Select) and isinstance(node.index, Index):
+        ranked, choice = node.options, node.index.identity
     found = [_of_rank(each) for each in ranked]
     first = found[0]
     if first is None or not all(each is not None and each.is_like(first) for each in found):
         return None
-    return replace(first, ranks=len(found))
+    return replace(first, ranks=len(found), choice=choice)
 
 
 def _of_rank(node: Node) -> LookUp | None:
@@ -150,18 +159,24 @@ class MapRelations:
                 f"SELECT DISTINCT e.f, e.object, r.region FROM ({at}) e JOIN {relation} r ON r.source = e.region",
             )
 
-    def may_be_in(self, region: Select, reach: float) -> str | None:
+    def may_be_in(self, region: Select, reach: float, required: Sequence[Node]) -> str | None:
         """A condition on memberships that an object meets which lies in a region that hangs on where the ego is.
 
         Args:
             region: The region.
             reach: Metres that the object may be off; at most `MEMBERSHIP_RADIUS_M`.
+            required: All that is required: the map may have no such region for some elements.
 
         Returns:
             SQL over the columns of `memberships` and `q.f`; None if the region is not made of elements of the map.
         """
-        look_up = self.of_ego(region.index)
-        if look_up is None or (meant := self._meant(region)) is None or look_up.occupancy.nothing in meant:
+        look_up, meant = self.of_ego(region.index), self._meant(region)
+        if look_up is None or meant is None:
+            return None
+        for found in map(allowed_elements, required):
+            if found is not None and found[0].is_same(look_up):
+                meant = {place: ids for place, ids in meant.items() if place in found[1]}
+        if look_up.occupancy.nothing in meant:
             return None
         return self._in_meant(self._table(look_up.occupancy, meant), reach)
 
