@@ -26,6 +26,7 @@ from scenicq.forest.columns import (
     ColumnPlaces,
     Data,
     Placed,
+    Vectors,
     common_status,
     constant_column,
     distances,
@@ -48,6 +49,7 @@ from scenicq.forest.nodes import (
     DirectionAt,
     DiscAt,
     Distance,
+    Encloses,
     Feature,
     Kind,
     Leaf,
@@ -63,9 +65,11 @@ from scenicq.forest.nodes import (
     VectorSum,
 )
 from scenicq.geometry.angles import azimuth_array, wrap_array
+from scenicq.geometry.boxes import box_polygons
+from scenicq.geometry.containment import covers_many
 from scenicq.geometry.fields import VectorField
-from scenicq.geometry.membership import contains_many
-from scenicq.geometry.regions import SLACK, Region
+from scenicq.geometry.membership import contains_many, distance_many
+from scenicq.geometry.regions import SLACK, PolygonSet, Region
 from scenicq.geometry.terms import UndecidedError
 
 __all__ = ["ColumnDomain"]
@@ -229,11 +233,11 @@ class ColumnDomain:
     def select(self, index: Column, options: Sequence[Column]) -> Column:
         """One of some options; the others do not matter."""
         numbers = _numbers(index)
-        data = [option.data for option in options]
         if numbers is None:
             return Column(np.full(1, np.nan), index.status)
         which = np.where(np.equal(index.status, DEFINED), numbers, 0).astype(np.intp)
         status = np.maximum(index.status, _picked(which, [option.status for option in options]))
+        data = _of_one_kind(options)
         arrays = [each for each in data if isinstance(each, np.ndarray)]
         if len(arrays) == len(data):
             return Column(_picked(which, arrays), status)
@@ -260,8 +264,12 @@ class ColumnDomain:
             if isinstance(shape, Placed):
                 away = distances(shape, *point)
                 return Column(away <= SLACK if isinstance(node, Contains) else away, common_status(args))
-            if isinstance(shape, Coded) and isinstance(node, Contains):
-                return self._contained(node, shape, args)
+            if isinstance(shape, Coded):
+                return self._of_regions(node, shape, args, partial(_of_points, node, point))
+        if isinstance(node, Encloses) and isinstance(args[0].data, Coded) and isinstance(args[1].data, Placed):
+            box = args[1].data
+            if isinstance(box.node, RectangleAt):
+                return self._of_regions(node, args[0].data, args, partial(_of_boxes, box))
         return self._each(partial(compute, node), args)
 
     def region(self, node: RegionNode, args: Sequence[Column]) -> Column:
@@ -273,18 +281,29 @@ class ColumnDomain:
             return Column(Placed(node, center, numbers), common_status(args))
         return self._each(partial(compute, node), args)
 
-    def _contained(self, node: Contains, regions: Coded, args: Sequence[Column]) -> Column:
+    def _of_regions(
+        self,
+        node: OnMap,
+        regions: Coded,
+        args: Sequence[Column],
+        ask: Callable[[Region, ColumnPlaces, NDArray[np.intp]], Array],
+    ) -> Column:
+        """What regions say of what is at some places, asked once for each region."""
         places = ColumnPlaces((*args,))
-        self._check(len(places.defined), "whether a region holds them")
-        found = np.zeros(places.count, dtype=np.bool_)
-        xy, which = places.points(args[1].data), places.spread(regions.which)[places.defined]
+        self._check(len(places.defined), "what regions say of them")
+        which = places.spread(regions.which)[places.defined]
+        found: Array | None = None
         for number in np.unique(which).tolist():
-            mine = which == number
+            mine = places.defined[which == number]
             try:
-                found[places.defined[mine]] = contains_many(cast(Region, regions.options[number]), xy[mine])
+                said = ask(cast(Region, regions.options[number]), places, mine)
             except UndecidedError:
                 # each place by itself, as geometry cannot answer at some of them
                 return self._each(partial(compute, node), args)
+            found = np.zeros(places.count, dtype=said.dtype) if found is None else found
+            found[mine] = said
+        if found is None:
+            return Column(np.full(1, np.nan), places.status.reshape(places.shape))
         return Column(found.reshape(places.shape), places.status.reshape(places.shape))
 
     def _direction(self, node: DirectionAt, field: Column, point: Column) -> Column:
@@ -335,6 +354,31 @@ class ColumnDomain:
         code = np.zeros(places.count, dtype=np.intp)
         code[places.defined] = number
         return Column(packed(values, said, code.reshape(places.shape)), status.reshape(places.shape))
+
+
+def _of_points(
+    node: Contains | Distance, point: Vectors, region: Region, places: ColumnPlaces, mine: NDArray[np.intp]
+) -> Array:
+    xy = np.column_stack([places.spread(axis)[mine] for axis in point])
+    return contains_many(region, xy) if isinstance(node, Contains) else distance_many(region, xy)
+
+
+def _of_boxes(box: Placed, region: Region, places: ColumnPlaces, mine: NDArray[np.intp]) -> Array:
+    if not isinstance(region, PolygonSet):
+        raise UndecidedError("whether a box lies in it")
+    numbers = [places.spread(each)[mine] for each in (*box.center, *box.numbers)]
+    return covers_many(region, box_polygons(*numbers))
+
+
+def _of_one_kind(options: Sequence[Column]) -> list[Data]:
+    """The data of options; that of one which is nowhere defined is of the others' kind, as it does not matter."""
+    there = [option.data for option in options if bool((option.status == DEFINED).any())]
+    nothing: Data = np.full(1, np.nan)
+    if there and isinstance(there[0], Coded):
+        nothing = Coded(np.zeros(1, np.intp), (None,))
+    elif there and isinstance(there[0], tuple):
+        nothing = (np.full(1, np.nan), np.full(1, np.nan))
+    return [option.data if bool((option.status == DEFINED).any()) else nothing for option in options]
 
 
 def _numbers(column: Column) -> Array | None:

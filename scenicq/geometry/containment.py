@@ -6,6 +6,8 @@ import math
 from collections.abc import Sequence
 from typing import TypeAlias
 
+import numpy as np
+from numpy.typing import NDArray
 from shapely.geometry import Polygon
 
 from scenicq.geometry import shapes
@@ -24,7 +26,7 @@ from scenicq.geometry.regions import (
 )
 from scenicq.geometry.terms import overlap, rectangle_shape
 
-__all__ = ["covers", "overlaps"]
+__all__ = ["covers", "covers_many", "overlaps"]
 
 Answer: TypeAlias = bool | None
 """None where it cannot be told: a region removes too many separate discs, or has no end."""
@@ -63,6 +65,20 @@ def covers(outer: Region, box: Polygon) -> Answer:
             inner = box.buffer(-_EDGE_M)
             outside = meets(difference(Everywhere(), outer), box if inner.is_empty else inner)
             return None if outside is None else not outside
+
+
+def covers_many(outer: PolygonSet, boxes: NDArray[np.object_]) -> NDArray[np.bool_]:
+    """`covers` for an array (n,) of convex polygons; a boolean array (n,)."""
+    owner, hit = shapes.tree_pairs(outer.tree, boxes)
+    pieces, count = shapes.array(outer.pieces), np.bincount(owner, minlength=len(boxes))
+    whole = shapes.areas(boxes)
+    missed = np.where(count == 0, whole, 0.0)
+    alone = count[owner] == 1
+    missed[owner[alone]] = shapes.areas(shapes.difference_many(boxes[owner[alone]], pieces[hit[alone]]))
+    found = missed <= _SLIVER * whole
+    for number in np.flatnonzero(count > 1).tolist():
+        found[number] = _together(pieces[np.sort(hit[owner == number])].tolist(), boxes[number])
+    return found
 
 
 def _together(pieces: Sequence[shapes.Shape], box: Polygon) -> bool:

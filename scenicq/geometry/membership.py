@@ -33,7 +33,16 @@ from scenicq.geometry.shape_distances import to_discs, to_rectangles, to_sectors
 from scenicq.geometry.shapes import XY, Bounds
 from scenicq.geometry.terms import overlap, terms
 
-__all__ = ["bounds", "contains", "contains_many", "distance", "may_be_within", "nearest_point", "parts_near"]
+__all__ = [
+    "bounds",
+    "contains",
+    "contains_many",
+    "distance",
+    "distance_many",
+    "may_be_within",
+    "nearest_point",
+    "parts_near",
+]
 
 _FIRST_REACH = 32.0
 _LAST_REACH = 1e8
@@ -152,6 +161,24 @@ def distance(region: Region, x: float, y: float) -> float:
             return math.inf if found is None else math.dist((x, y), found)
         case _:
             assert_never(region)
+
+
+def distance_many(region: Region, xy: NDArray[np.float64]) -> NDArray[np.float64]:
+    """`distance` for points of shape (n, 2), (n,).
+
+    Raises:
+        UndecidedError: As of `distance`, for one of the points.
+    """
+    match region:
+        case PolygonSet() | PolylineSet() | PointSet() if region.pieces:
+            found = np.full(len(xy), np.inf)
+            owner, _, nearest = shapes.tree_nearest(region.tree, shapes.points(xy))
+            found[owner] = nearest
+            return found
+        case UnionOf() if region.parts:
+            return np.min([distance_many(part, xy) for part in region.parts], axis=0)
+        case _:
+            return np.array([distance(region, x, y) for x, y in xy.tolist()], dtype=np.float64)
 
 
 def nearest_point(region: Region, x: float, y: float) -> XY | None:

@@ -61,7 +61,7 @@ def points(xy: Coordinates) -> NDArray[Any]:
     return cast("NDArray[Any]", shapely.points(xy))
 
 
-def array(geometries: Sequence[Shape]) -> NDArray[Any]:
+def array(geometries: Sequence[Shape] | NDArray[Any]) -> NDArray[Any]:
     """Array (n,) of geometries, as the vectorised functions want it."""
     result = np.empty(len(geometries), dtype=object)
     result[:] = geometries
@@ -208,6 +208,11 @@ def difference(a: Shape, b: Shape) -> Shape:
     return _overlay(shapely.difference, a, b)
 
 
+def difference_many(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:
+    """`difference`, pair by pair."""
+    return cast("NDArray[Any]", _overlay(shapely.difference, a, b))
+
+
 def union_all(geometries: Sequence[Shape]) -> Shape:
     """The union."""
     return _overlay(shapely.union_all, array(geometries))
@@ -218,7 +223,7 @@ def snapped_union(geometries: Sequence[Shape]) -> Shape:
     return _overlay(shapely.union_all, array(geometries), exact=False)
 
 
-def areas(geometries: Sequence[Shape]) -> NDArray[np.float64]:
+def areas(geometries: Sequence[Shape] | NDArray[Any]) -> NDArray[np.float64]:
     """Areas in square metres, shape (n,)."""
     return shapely.area(array(geometries))
 

@@ -42,6 +42,7 @@ from scenicq.forest.nodes import (
     DirectionAt,
     DiscAt,
     Distance,
+    Encloses,
     Feature,
     Intersects,
     Logic,
@@ -59,7 +60,7 @@ from scenicq.forest.nodes import (
 )
 from scenicq.geometry.default_street import street
 from scenicq.geometry.membership import contains, contains_many, distance
-from scenicq.geometry.regions import Disc, Rectangle, Sector
+from scenicq.geometry.regions import Disc, PolygonSet, Rectangle, Sector
 
 ROWS, DRAWS = 3, 4
 X, Y = Feature(0, "x", "scalar"), Feature(0, "y", "scalar")
@@ -203,6 +204,44 @@ def test_shapes_at_columns_agree_with_regions():
     fixed = Sector((0.0, 1.0), 7.0, 0.4, 1.0)
     many = contains_many(fixed, np.column_stack((x, y)))
     assert many.tolist() == [contains(fixed, *point) for point in zip(x, y, strict=True)]
+
+
+def test_many_places_are_asked_together_of_chosen_regions(monkeypatch):
+    """Boxes and points against the region that is chosen at each place, of which one may be missing."""
+    lanes = [PolygonSet((lane.polygon,), "lane") for lane in street().lanes[:6]]
+    both = PolygonSet(tuple(lane.polygon for lane in street().lanes[:6]), "lanes")
+    rng = np.random.default_rng(8)
+    west, south, east, north = both.extent
+    rows = 400
+    numbers = {
+        "x": rng.uniform(west - 3, east + 3, rows),
+        "y": rng.uniform(south - 3, north + 3, rows),
+        "heading": rng.choice([0.0, math.pi / 2, 0.3], rows),
+        "width": rng.choice([0.0, 0.5, 1.9], rows),
+        "length": rng.choice([0.5, 4.6], rows),
+        "which": rng.integers(0, len(lanes) + 2, rows).astype(float),
+    }
+    by_name = {name: Feature(0, name, "scalar") for name in numbers}
+    values = {(0, name): Column(each, np.full(1, DEFINED)) for name, each in numbers.items()}
+    region = Select(by_name["which"], tuple(map(build.constant, (*lanes, both, Undefined("no lane")))))
+    point = VectorOf(X, Y)
+    box = RectangleAt(point, by_name["heading"], by_name["width"], by_name["length"])
+    asked = [Encloses(region, box), Distance(region, point), Contains(region, point)]
+    expected = [
+        [evaluate(node, {}, {(0, name): float(each[row]) for name, each in numbers.items()}) for row in range(rows)]
+        for node in asked
+    ]
+    one_by_one = []
+    monkeypatch.setattr("scenicq.forest.column_domain.compute", lambda *args: one_by_one.append(args))
+    for node, wanted in zip(asked, expected, strict=True):
+        data, status = computed(node, domain_of(values))
+        found = np.broadcast_to(data, rows).tolist()
+        for row, each in enumerate(wanted):
+            missing = isinstance(each, Undefined)
+            assert np.broadcast_to(status, rows)[row] == (UNDEFINED if missing else DEFINED)
+            assert missing or found[row] == each
+    assert not one_by_one
+    assert {each for each in expected[0] if isinstance(each, bool)} == {True, False}
 
 
 def test_directions_are_picked_where_a_field_allows_several():

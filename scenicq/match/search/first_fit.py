@@ -3,8 +3,8 @@
 Most of what a prefilter leaves matches in the first way that is tried. Where all groups of a plan have closed forms,
 the labels that share it are a batch: role by role, in the order of the program, each label gives its next free
 candidate, and the closed forms are computed once for the whole batch. Labels whose candidate fails form a batch of
-their own with their next one, or with the next of an earlier role. Whoever is not surely decided, or runs out of
-candidates, is left to `LabelSearch`. One label is a batch of one.
+their own with their next one, or with the next of an earlier role. A label all of whose candidates surely fail does
+not match. Whoever is not surely decided is left to `LabelSearch`. One label is a batch of one.
 """
 
 from __future__ import annotations
@@ -20,20 +20,22 @@ from numpy.typing import NDArray
 
 from scenicq.budget import look
 from scenicq.forest.compute import CannotEvaluate
+from scenicq.forest.groups import Constraint
 from scenicq.forest.nodes import Identity, Leaf, Value
 from scenicq.forest.scenario import Scenario
 from scenicq.limits import LIMITS
-from scenicq.match.decide.closed_form import ClosedForm
+from scenicq.match.decide.closed_form import ClosedForm, Evaluated
 from scenicq.match.decide.range_forms import Columns, FloatColumn, Get
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import Candidates
 from scenicq.match.problem.constraints import Signature
 from scenicq.match.problem.map_lookups import MapLookups
 from scenicq.match.problem.observation import observe, observed_names
+from scenicq.match.problem.outcome import Outcome
 from scenicq.match.search.group_plan import GroupPlan, MatchPlan
 from scenicq.store.labels import Label, LabelObject
 
-__all__ = ["FilledBatch", "FirstFit", "LabelRow", "first_fit_of", "signature_of"]
+__all__ = ["FailedBatch", "FilledBatch", "FirstFit", "LabelRow", "first_fit_of", "signature_of"]
 
 _SCALARS = frozenset({"heading", "width", "length", "height"})
 
@@ -85,6 +87,47 @@ class FilledBatch:
     witnesses: Sequence[tuple[Value, ...]]
 
 
+@dataclass(frozen=True, slots=True)
+class FailedBatch:
+    """Labels that do not match.
+
+    Attributes:
+        rows: The labels.
+        numbers: Of each, who plays the objects of `FirstFit.order` in the correspondence that comes furthest.
+        constraint: What fails of that.
+        form: The closed form of the group of which it is one.
+        ranks: Where in that order each object is.
+    """
+
+    rows: Sequence[LabelRow]
+    numbers: Sequence[tuple[int, ...]]
+    constraint: Constraint
+    form: ClosedForm
+    ranks: Mapping[int, int]
+
+    def outcomes(self, options: MatchOptions, lookups: MapLookups) -> Iterator[Outcome | None]:
+        """What is said of each label in words; None where it is not clear."""
+        return (
+            self.form.decide(_getter(row, numbers, self.ranks), options, lookups)
+            for row, numbers in zip(self.rows, self.numbers, strict=True)
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class _Failure:
+    """What failed furthest of a label.
+
+    Attributes:
+        depth: How many roles were filled, and the place of the group among those that are due then.
+        form: The closed form of the group.
+        numbers: Who played the roles.
+    """
+
+    depth: tuple[int, int]
+    form: ClosedForm
+    numbers: tuple[int, ...]
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class FirstFit:
     """A plan whose groups all have closed forms.
@@ -103,8 +146,12 @@ class FirstFit:
     due: tuple[tuple[tuple[GroupPlan, ClosedForm], ...], ...]
     most_decisions: int
 
-    def fill(self, rows: Sequence[LabelRow], options: MatchOptions, lookups: MapLookups) -> Iterator[FilledBatch]:
-        """The labels whose roles can be filled, in batches; the others are left out.
+    def fill(
+        self, rows: Sequence[LabelRow], options: MatchOptions, lookups: MapLookups
+    ) -> Iterator[FilledBatch | FailedBatch]:
+        """The labels whose roles can be filled, or surely cannot, in batches; the others are left out.
+
+        Labels without a match are left out where there are several roles: it takes a search to say what fails.
 
         Args:
             rows: Labels of the plan.
@@ -119,12 +166,16 @@ class FirstFit:
             look()
             batch = todo.pop()
             depth = len(batch.numbers[0])
-            for group, form in self.due[depth - 1]:
+            for place, (group, form) in enumerate(self.due[depth - 1]):
                 holds, fails = batch.decide(group, form, options, lookups)
                 if holds is True:
                     continue
                 if fails is not False:
-                    todo += batch.where(fails).with_next_candidate()
+                    failing = batch.where(fails)
+                    if len(self.order) <= 2:
+                        failing.note((depth, place), form)
+                        yield from failing.lost(options, lookups)
+                    todo += failing.with_next_candidate()
                 if holds is False:
                     break
                 batch = batch.where(holds)
@@ -146,6 +197,7 @@ class _Batch:
         values: By group, the values of its random variables: a column each, or what all labels have.
         decisions: How many groups were decided for these labels.
         columns: What is observed of the label objects in the roles.
+        failures: What failed furthest of each label, as far as it is noted.
     """
 
     fit: FirstFit
@@ -156,6 +208,7 @@ class _Batch:
     )
     decisions: int = 0
     columns: Columns | None = None
+    failures: list[_Failure | None] | None = None
 
     def decide(
         self, group: GroupPlan, form: ClosedForm, options: MatchOptions, lookups: MapLookups
@@ -166,12 +219,9 @@ class _Batch:
         if self.decisions > self.fit.most_decisions:
             return False, False
         if size == 1:
-            holds, fails, self.values[group] = form.evaluate_one(self._get(0), options, lookups)
+            holds, fails, self.values[group] = form.evaluate_one(self.get(0), options, lookups)
             return holds, fails
-        if self.columns is None:
-            # not a method of this batch: a cycle would keep its labels until the collector comes
-            self.columns = Columns(size, functools.partial(_column, self.fit.ranks, self.rows, self.numbers))
-        holds, fails, self.values[group] = form.evaluate_many(self._get, self.columns, options, lookups)
+        holds, fails, self.values[group] = self.evaluate(form, options, lookups)
         return _alike(_listed(holds, size)), _alike(_listed(fails, size))
 
     def where(self, kept: RowTruth) -> _Batch:
@@ -184,7 +234,39 @@ class _Batch:
             for group, found in self.values.items()
         }
         rows, numbers = itertools.compress(self.rows, kept), itertools.compress(self.numbers, kept)
-        return _Batch(self.fit, [*rows], [*numbers], values, self.decisions)
+        failures = None if self.failures is None else [*itertools.compress(self.failures, kept)]
+        return _Batch(self.fit, [*rows], [*numbers], values, self.decisions, failures=failures)
+
+    def note(self, depth: tuple[int, int], form: ClosedForm) -> None:
+        """Note that a group fails of all labels, where nothing failed as far as that before."""
+        before: list[_Failure | None] = self.failures or [None] * len(self.rows)
+        self.failures = [
+            _Failure(depth, form, mine) if known is None or known.depth < depth else known
+            for known, mine in zip(before, self.numbers, strict=True)
+        ]
+
+    def lost(self, options: MatchOptions, lookups: MapLookups) -> Iterator[FailedBatch]:
+        """The labels, all failing now, that have no other candidate, with what fails of them."""
+        order, found = self.fit.order, dict[ClosedForm, list[int]]()
+        if self.failures is None:
+            return
+        for number, (row, mine) in enumerate(zip(self.rows, self.numbers, strict=True)):
+            failure = self.failures[number]
+            played = all(row.candidates[index] for index in order[1:])
+            if failure is not None and played and not _following(order, row.candidates, mine):
+                found.setdefault(failure.form, []).append(number)
+        for form, some in found.items():
+            furthest = [failure.numbers for number in some if (failure := self.failures[number]) is not None]
+            yield from _blamed(
+                form, _Batch(self.fit, [self.rows[number] for number in some], furthest), options, lookups
+            )
+
+    def evaluate(self, form: ClosedForm, options: MatchOptions, lookups: MapLookups) -> Evaluated:
+        """What a closed form says of the labels."""
+        if self.columns is None:
+            # not a method of this batch: a cycle would keep its labels until the collector comes
+            self.columns = Columns(len(self.rows), functools.partial(_column, self.fit.ranks, self.rows, self.numbers))
+        return form.evaluate_many(self.get, self.columns, options, lookups)
 
     def with_next_role(self) -> list[_Batch]:
         """The labels with the first free candidate for the next role; without one, with the next for an earlier one."""
@@ -237,16 +319,34 @@ class _Batch:
         witnesses = list(zip(*columns, strict=True)) if columns else [()] * size
         return FilledBatch(self.rows, self.numbers, tuple(variables), witnesses)
 
-    def _get(self, number: int) -> Get:
+    def get(self, number: int) -> Get:
         """The observed values of one label."""
-        row, numbers, ranks = self.rows[number], self.numbers[number], self.fit.ranks
-        known = row.seen
+        return _getter(self.rows[number], self.numbers[number], self.fit.ranks)
 
-        def get(index: int, name: str) -> Value:
-            playing = numbers[ranks[index]]
-            return (known[playing] if playing in known else row.observed(playing))[name]
 
-        return get
+def _getter(row: LabelRow, numbers: tuple[int, ...], ranks: Mapping[int, int]) -> Get:
+    """The observed values of one label."""
+    known = row.seen
+
+    def get(index: int, name: str) -> Value:
+        playing = numbers[ranks[index]]
+        return (known[playing] if playing in known else row.observed(playing))[name]
+
+    return get
+
+
+def _blamed(form: ClosedForm, batch: _Batch, options: MatchOptions, lookups: MapLookups) -> Iterator[FailedBatch]:
+    """Labels of which a group fails, by its first constraint that fails alone, or else by the first."""
+    left, ranks = batch, batch.fit.ranks
+    for part in form.parts:
+        fails = _listed(left.evaluate(part, options, lookups).fails, len(left.rows))
+        if any(fails):
+            some = left.where(fails)
+            yield FailedBatch(some.rows, some.numbers, part.constraint, form, ranks)
+            if all(fails):
+                return
+            left = left.where([not each for each in fails])
+    yield FailedBatch(left.rows, left.numbers, form.constraint, form, ranks)
 
 
 def _column(

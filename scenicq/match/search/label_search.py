@@ -222,7 +222,9 @@ class LabelSearch:
     ) -> tuple[list[Slot], set[tuple[int, int]]] | None:
         """Candidates that pass the groups about them and the ego alone, and those for which some are undecided."""
         left = wanted
-        if self.options.method == "auto":
+        # where closed forms decide one role, what comes furthest is told by them, as first fit does
+        closed = len(wanted) <= 1 and all(group.closed_form for group in plan.groups)
+        if self.options.method == "auto" and not closed:
             left, failed = arc_consistent(plan, wanted, self.problem, self.scenario.ego, self.options.tolerance)
             if failed is not None:
                 self._explain_thinning(*failed, wanted, ego)

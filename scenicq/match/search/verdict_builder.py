@@ -6,13 +6,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from scenicq.budget import Exhausted
-from scenicq.forest.groups import Comparison
+from scenicq.forest.groups import Comparison, Constraint
 from scenicq.forest.nodes import Leaf, Value
 from scenicq.forest.scenario import Scenario
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.constraints import describe_constraint, unobserved_motion
-from scenicq.match.problem.outcome import UNOBSERVED, Refuted
-from scenicq.match.search.first_fit import FilledBatch, FirstFit
+from scenicq.match.problem.outcome import UNOBSERVED, Outcome, Refuted, Undecided
+from scenicq.match.search.first_fit import FailedBatch, FilledBatch, FirstFit
 from scenicq.match.search.label_search import Failure, LabelSearch, Solution
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown, Verdict, WitnessValue
 from scenicq.store.labels import Label
@@ -59,6 +59,25 @@ class VerdictBuilder:
             names = {name: objects[numbers[rank] - 1].id if numbers[rank] else "ego" for name, rank in ranks}
             yield row.number, Match(names, _witness(keys, values))
 
+    def failed(self, batch: FailedBatch, outcomes: Iterator[Outcome | None] | None) -> Iterator[tuple[int, NoMatch]]:
+        """The verdicts of labels that do not match, with their places.
+
+        Args:
+            batch: The labels.
+            outcomes: What is said of each, if somebody reads it; a label of which it is None gets no verdict.
+        """
+        if outcomes is None:
+            constraint = batch.constraint
+            what = describe_constraint(self.scenario, constraint)
+            verdict = NoMatch(Cause(what, "", constraint.span, _about(constraint)))
+            yield from ((row.number, verdict) for row in batch.rows)
+            return
+        owners = sorted(batch.ranks.items())
+        for row, numbers, outcome in zip(batch.rows, batch.numbers, outcomes, strict=True):
+            if isinstance(outcome, Refuted):
+                assignment = {index: numbers[rank] for index, rank in owners if rank < len(numbers)}
+                yield row.number, NoMatch(self._cause(outcome), self.names(row.label, assignment))
+
     def without_match(self, label: Label, search: LabelSearch, ended: Exhausted | None) -> tuple[int, Verdict]:
         """The verdict of a search without a match, and its weight: an unknown outweighs every no.
 
@@ -77,13 +96,13 @@ class VerdictBuilder:
             return 0, self.excluded(
                 label, search.problem.ego, Cause("correspondence", "no distinct label objects for all objects")
             )
-        return failure.depth, NoMatch(self._cause(failure), self.names(label, ego | dict(failure.assignment)))
+        return failure.depth, NoMatch(self._cause(failure.outcome), self.names(label, ego | dict(failure.assignment)))
 
     def open(self, label: Label, search: LabelSearch, found: Failure) -> Unknown:
         """The verdict of a correspondence that a search leaves open."""
         reason = "" if isinstance(found.outcome, Refuted) else found.outcome.reason
         assignment = {self.scenario.ego: search.problem.ego} | dict(found.assignment)
-        cause = self._cause(found)
+        cause = self._cause(found.outcome)
         if reason == UNOBSERVED:
             seen = {index: search.problem.seen[number] for index, number in assignment.items()}
             cause = replace(cause, detail=unobserved_motion(self.scenario, seen, found.constraint))
@@ -106,10 +125,10 @@ class VerdictBuilder:
             for index, number in sorted(assignment.items())
         }
 
-    def _cause(self, failure: Failure) -> Cause:
-        constraint = failure.constraint
-        about = (constraint.object,) if isinstance(constraint, Comparison) else constraint.requirement.objects
-        return Cause(describe_constraint(self.scenario, constraint), failure.outcome.detail, constraint.span, about)
+    def _cause(self, outcome: Refuted | Undecided) -> Cause:
+        constraint = outcome.constraint
+        what = describe_constraint(self.scenario, constraint)
+        return Cause(what, outcome.detail, constraint.span, _about(constraint))
 
     def _named(self, variables: Sequence[Leaf]) -> list[str]:
         """What a witness calls random variables: their places in the program, numbered where several share one."""
@@ -122,6 +141,11 @@ class VerdictBuilder:
             counts[key] = counts.get(key, 0) + 1
             keys.append(key if counts[key] == 1 else f"{key}#{counts[key]}")
         return keys
+
+
+def _about(constraint: Constraint) -> tuple[int, ...]:
+    """The objects that a constraint is about."""
+    return (constraint.object,) if isinstance(constraint, Comparison) else constraint.requirement.objects
 
 
 def _witness(keys: Sequence[str], values: Sequence[Value]) -> dict[str, WitnessValue]:

@@ -269,7 +269,7 @@ class Decider:
                     check_deadline(self.until)
                     yield [_result(label, verdict) for verdict in _every_match(matcher, label, among)]
             else:
-                for (label, _), verdict in zip(batch, matcher.match_all(batch), strict=True):
+                for (label, _), verdict in zip(batch, matcher.match_all(batch, details=self.every), strict=True):
                     if self.until is not None:
                         check_deadline(self.until)
                     yield [_result(label, verdict)]

@@ -21,9 +21,11 @@ from scenicq.forest.nodes import (
     Contains,
     DirectionAt,
     DiscAt,
+    Encloses,
     Feature,
     Node,
     PointIn,
+    RectangleAt,
     RegionIntersection,
     Rotate,
     SectorAt,
@@ -299,7 +301,7 @@ class ConditionReader:
         """The same for a requirement."""
         for part in conjuncts(in_ego_frame(root, self.scenario.ego)):
             objects = self.involved(part)
-            if (looked_up := self.relations.may_hold(part)) is not None:
+            if (looked_up := self.relations.may_hold(part, self.required)) is not None:
                 yield objects, "", looked_up[1]
                 continue
             if (places := shared_look_ups(part)) is not None and len(objects) == 1:
@@ -309,13 +311,25 @@ class ConditionReader:
                     continue
             if len(objects) > 2:
                 continue
-            if isinstance(part, Contains) and isinstance(part.point, Feature) and part.point.property == "position":
-                if isinstance(part.region, Constant) and isinstance(part.region.value, Region):
-                    near = near_region(part.region.value, self.names, 0.0)
-                    if near is not None:
-                        yield objects, "", near
+            if (held := _held(part)) is not None:
+                region, place = held
+                own = self.of((place.object,)).columns[place.object, "position"]
+                for near, sql in self._inside(region, (own[0], own[1]), self.of(objects), self.names, 0.0):
+                    yield (() if place.object == self.scenario.ego else (place.object,)) if near else objects, sql, near
                 continue
             yield objects, _sql(self.of(objects).can_hold(part)), ""
+
+
+def _held(condition: Node) -> tuple[Node, Feature] | None:
+    """A region, and the place of an object that lies in it where a condition holds: a box has its centre inside."""
+    match condition:
+        case (
+            Contains(region=region, point=Feature(property="position") as place)
+            | Encloses(outer=region, inner=RectangleAt(center=Feature(property="position") as place))
+        ):
+            return region, place
+        case _:
+            return None
 
 
 def difference(a: Expr, b: Expr) -> Expr:

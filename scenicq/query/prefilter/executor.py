@@ -241,7 +241,9 @@ def _name(connection: duckdb.DuckDBPyConnection, plan: Plan) -> None:
     """Make the tables of names that a plan reads and a connection does not have: their texts are long."""
     if not plan.names:
         return
-    known = {name for (name,) in connection.execute("SELECT table_name FROM duckdb_tables() WHERE temporary").fetchall()}
+    known = {
+        name for (name,) in connection.execute("SELECT table_name FROM duckdb_tables() WHERE temporary").fetchall()
+    }
     for table, query in plan.names:
         if table.partition("(")[0] not in known:
             connection.execute(new_table(table, query))

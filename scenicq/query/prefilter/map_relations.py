@@ -9,9 +9,17 @@ elements that may be meant (necessary), and of those that surely lie at the plac
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+from numpy.typing import NDArray
+
+from scenicq.forest.column_domain import ColumnDomain
+from scenicq.forest.columns import DEFINED, UNKNOWN, Column, truth_of
+from scenicq.forest.compute import CannotEvaluate
+from scenicq.forest.interpret import interpret, steps_of
 from scenicq.forest.nodes import (
     Arithmetic,
     ArithmeticOp,
@@ -22,11 +30,10 @@ from scenicq.forest.nodes import (
     Feature,
     Identity,
     Index,
-    Logic,
-    LogicOp,
     Node,
     Select,
 )
+from scenicq.forest.walk import children, is_leaf
 from scenicq.geometry.occupancy import TOLERANCE, ElementAtPoint, Occupancy
 from scenicq.geometry.regions import Region
 from scenicq.limits import LIMITS
@@ -88,27 +95,53 @@ def _of_rank(node: Node) -> LookUp | None:
             return None
 
 
+@functools.lru_cache(maxsize=256)
 def allowed_elements(root: Node) -> tuple[LookUp, frozenset[int]] | None:
     """The numbers of elements at one place for which a condition holds, if it asks for nothing else."""
-    positive = True
-    while isinstance(root, Logic) and root.op is LogicOp.NOT:
-        (root,), positive = root.args, not positive
-    match root:
-        case Select() if (look_up := look_up_of(root.index)) is not None:
-            values = [each.value if isinstance(each, Constant) else None for each in root.options]
-            if not all(isinstance(value, bool) for value in values):
-                return None
-            numbers = {place for place, value in enumerate(values) if value}
-        case (
-            Compare(op=CompareOp.EQ | CompareOp.NE, left=left, right=Constant(value=float(value)))
-            | Compare(op=CompareOp.EQ | CompareOp.NE, left=Constant(value=float(value)), right=left)
-        ) if (look_up := look_up_of(left)) is not None:
-            numbers = {int(value)} if value.is_integer() else set[int]()
-            positive = positive == (root.op is CompareOp.EQ)
-        case _:
+    inner: dict[int, LookUp] = {}
+    todo, seen = [root], set[int]()
+    while todo:
+        node = todo.pop()
+        if id(node) in seen:
+            continue
+        seen.add(id(node))
+        if (look_up := look_up_of(node)) is not None:
+            inner[id(node)] = look_up
+        elif isinstance(node, Feature) or is_leaf(node):
             return None
-    every = frozenset(range(look_up.occupancy.nothing + 1))
-    return look_up, every & numbers if positive else every - numbers
+        else:
+            todo += children(node)
+    look_up = next(iter(inner.values()), None)
+    if look_up is None or not all(each.is_same(look_up) for each in inner.values()):
+        return None
+    count = look_up.occupancy.nothing + 1
+    numbers = Column(np.arange(count, dtype=np.float64), np.full(1, DEFINED))
+    try:
+        found = interpret(steps_of(root, known=inner), _TABULATED, dict.fromkeys(inner, numbers))[id(root)]
+    except CannotEvaluate:
+        return None
+    if bool((found.status == UNKNOWN).any()):
+        return None
+    holds = np.broadcast_to(truth_of(found.data) & (found.status == DEFINED), count)
+    return look_up, frozenset(np.flatnonzero(holds).tolist())
+
+
+def _among(look_up: LookUp, required: Sequence[Node]) -> frozenset[int]:
+    """The numbers of the elements that may be meant by a look-up where all of some conditions hold."""
+    found = [each for each in map(allowed_elements, required) if each is not None and each[0].is_same(look_up)]
+    return frozenset(range(look_up.occupancy.nothing + 1)).intersection(*(numbers for _, numbers in found))
+
+
+def _absent(node: Node, *_: object) -> Column:
+    raise CannotEvaluate(f"{type(node).__name__} is none of the element's")
+
+
+def _first(_: DirectionAt, counts: NDArray[np.intp]) -> NDArray[np.intp]:
+    return np.zeros_like(counts)
+
+
+_TABULATED = ColumnDomain(_absent, _absent, _first)
+"""What conditions are for each element, where they hang on nothing else."""
 
 
 def shared_look_ups(node: Node) -> tuple[LookUp, LookUp] | None:
@@ -173,9 +206,8 @@ class MapRelations:
         look_up, meant = self.of_ego(region.index), self._meant(region)
         if look_up is None or meant is None:
             return None
-        for found in map(allowed_elements, required):
-            if found is not None and found[0].is_same(look_up):
-                meant = {place: ids for place, ids in meant.items() if place in found[1]}
+        among = _among(look_up, required)
+        meant = {place: ids for place, ids in meant.items() if place in among}
         if look_up.occupancy.nothing in meant:
             return None
         return self._in_meant(self._table(look_up.occupancy, meant), reach)
@@ -196,18 +228,23 @@ class MapRelations:
         some = {place: ids for place, ids in meant.items() if place in among}
         return self._in_meant(self._table(look_up.occupancy, some, most), reach)
 
-    def may_hold(self, root: Node) -> tuple[int, str] | None:
+    def may_hold(self, root: Node, required: Sequence[Node]) -> tuple[int, str] | None:
         """A condition on memberships that a condition on what lies where an object is amounts to.
+
+        Args:
+            root: The condition.
+            required: All that is required, the condition among it.
 
         Returns:
             The object, and SQL over the columns of its memberships; None where it is no such condition, or may hold
             where nothing lies.
         """
-        found = allowed_elements(root)
-        sources = None if found is None else self._sources(found[0].occupancy)
-        if found is None or sources is None or found[0].occupancy.nothing in found[1]:
+        if (found := allowed_elements(root)) is None:
             return None
-        ids = sorted({each for layer in sources for each, place in layer if place in found[1]})
+        sources, among = self._sources(found[0].occupancy), found[1] & _among(found[0], required)
+        if sources is None or found[0].occupancy.nothing in among:
+            return None
+        ids = sorted({each for layer in sources for each, place in layer if place in among})
         return found[0].object, f"(region IN {named(ids, self.names)} AND {_AT})"
 
     def surely_holds(self, look_up: LookUp, among: Collection[int], most: int) -> str | None:
@@ -333,4 +370,3 @@ class _Table:
     first: tuple[str, ...]
     most: int
     everybody: bool
-

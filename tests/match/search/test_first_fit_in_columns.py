@@ -21,7 +21,7 @@ from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import candidates_of
 from scenicq.match.search.first_fit import LabelRow
 from scenicq.match.tolerance import Tolerance
-from scenicq.match.verdict import Match
+from scenicq.match.verdict import Match, NoMatch
 from scenicq.smt.solver import open_solver
 
 ROWS = """
@@ -108,6 +108,37 @@ def test_the_same_is_found_together(name, options, solver):
     assert list(map(str, together)) == list(map(str, alone))
     if not options.radius:
         assert any(isinstance(verdict, Match) for verdict in together)
+    brief = list(matcher.match_all(asked, details=False))
+    assert [_in_brief(each) for each in brief] == [_in_brief(each) for each in alone]
+    # a search by itself comes as far as first fit
+    searched = [next(matcher.findings(label, among=among)).verdict for label, among in asked]
+    assert [_in_brief(each) for each in searched if isinstance(each, NoMatch)] == [
+        _in_brief(each) for each in alone if isinstance(each, NoMatch)
+    ]
+
+
+def _in_brief(verdict):
+    """What is said of a verdict where nobody reads why."""
+    return (NoMatch, verdict.cause.what, verdict.cause.span) if isinstance(verdict, NoMatch) else verdict
+
+
+@pytest.mark.parametrize("name", ["ahead", "offset"])
+def test_what_surely_does_not_match_is_not_searched_one_by_one(name, monkeypatch):
+    scenario = compiled(HEADER + CASES[name], STREET)
+    options = MatchOptions(tolerance=Tolerance(position=0.01, heading=0.01))
+    matcher = Matcher(scenario, options)
+    found = []
+    for label in labels(scenario, range(4)):
+        away = tuple(replace(each, x=each.x + 500.0) for each in label.objects)
+        found.append(replace(label, objects=(*away, *(replace(each, id=f"{each.id}-too") for each in away))))
+    asked = with_candidates(matcher.scenario, options, [each for each in found if each.objects])
+    told = [_in_brief(matcher.match(label, among=among)) for label, among in asked]
+    alone = []
+    monkeypatch.setattr(Matcher, "_findings", lambda *args: alone.append(args))
+    for details in (False, True):
+        assert [_in_brief(each) for each in matcher.match_all(asked, details=details)] == told
+    assert not alone
+    assert {each[0] for each in told} == {NoMatch}
 
 
 @pytest.mark.parametrize("name", SURE)

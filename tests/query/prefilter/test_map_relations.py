@@ -12,7 +12,7 @@ import pytest
 
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import ScenarioError, Source
-from scenicq.forest.nodes import PointIn, Select
+from scenicq.forest.nodes import Constant, Index, PointIn, Select
 from scenicq.geometry.regions import PolygonSet
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
@@ -143,10 +143,17 @@ def test_something_may_be_meant_where_nothing_lies():
     assert isinstance(node, PointIn)
     assert isinstance(node.region, Select)
     relations = MapRelations(RegionNames(STREET), 0)
-    assert relations.may_be_in(node.region, 0.25) is not None
+    assert relations.may_be_in(node.region, 0.25, ()) is not None
     somewhere = next(each for each in node.region.options if isinstance(each.value, PolygonSet))
     options = [each if isinstance(each.value, PolygonSet) else somewhere for each in node.region.options]
-    assert relations.may_be_in(replace(node.region, options=tuple(options)), 0.25) is None
+    region = replace(node.region, options=tuple(options))
+    assert relations.may_be_in(region, 0.25, ()) is None
+    # what is required of the element that is meant excludes it, of another one at the place it does not
+    there = (*tuple(Constant(each is not options[-1]) for each in options[:-1]), Constant(False))
+    assert relations.may_be_in(region, 0.25, (Select(region.index, there),)) is not None
+    assert isinstance(region.index, Select)
+    another = Select(replace(region.index, index=Index((1.0,) * len(region.index.options))), there)
+    assert relations.may_be_in(region, 0.25, (another,)) is None
 
 
 @pytest.mark.parametrize("kind", ["lane", "laneGroup", "road", "intersection", "crossing", "laneSection"])
