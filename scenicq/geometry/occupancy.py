@@ -127,7 +127,8 @@ class Occupancy:
             here, hits = shapes.tree_pairs_within(tree, shapes.points(xy[left]), SLACK)
             options: dict[int, dict[int, int]] = {}
             # of several areas of one owner the first counts
-            for point, hit in sorted(zip(left[here].tolist(), hits.tolist(), strict=True), reverse=True):
+            pairs: list[tuple[int, int]] = list(zip(left[here].tolist(), hits.tolist(), strict=True))
+            for point, hit in sorted(pairs, reverse=True):
                 _, number, owner = layer[hit]
                 options.setdefault(point, {})[owner] = number
             for point, numbers in options.items():
