@@ -332,6 +332,9 @@ class Limits:
     related_regions: int = _coarser(
         20_000, "pairs", "of elements of the map and what a program makes of them", "the look-up excludes nothing"
     )
+    region_boxes: int = _coarser(
+        500, "boxes", "around pieces of a region to which SQL measures distances", "the distance excludes nothing"
+    )
     heading_terms: int = _coarser(64, "terms", "of a heading that is a sum", "the sum is one term")
     sql_alternatives: int = _coarser(16, "alternatives", "of one value that are kept apart", "they are one interval")
     sql_characters: int = _coarser(6000, "characters", "of an end of an interval", "the interval has no end")

@@ -91,6 +91,20 @@ def _meant(of: Callable[[Lane], Iterable[NetworkElement | None]]) -> str:
     return ", ".join(f"('{lane}', '{each}')" for lane, each in sorted(pairs))
 
 
+def _ahead(lane: Lane, metres: float) -> list[Lane]:
+    """A lane and those that it leads to which begin at most so far behind its end."""
+    begins, waiting = {lane: 0.0}, [lane]
+    while waiting:
+        now = waiting.pop()
+        assert now.centerline is not None
+        end = 0.0 if now is lane else begins[now] + sum(line.length for line in now.centerline.lines)
+        for each in now.successors:
+            if end <= metres and end < begins.get(each, math.inf):
+                begins[each] = end
+                waiting.append(each)
+    return list(begins)
+
+
 def _through(
     place: str, of: Callable[[Lane], Iterable[NetworkElement | None]], middle: int = 0, sort: str = "Car"
 ) -> Question:
@@ -295,5 +309,66 @@ here AS (SELECT DISTINCT m.frame FROM memberships m JOIN branches t ON t.lane = 
 SELECT DISTINCT a.frame FROM objects a JOIN ego USING (frame) JOIN here USING (frame)
 WHERE a.class = 'Truck' AND a.ego_distance > 5 AND a.ego_distance < 20
 AND abs(a.relative_heading) <= radians(25)""",
+    ),
+    "in the lanes ahead": _through("ego.lane.lanesAhead(30)", lambda lane: _ahead(lane, 30.0)),
+    "beside me in my lane group": _driving(
+        "other = new Car in ego.laneGroup, facing Range(-20, 20) deg relative to ego.heading\n"
+        "require not (other.position in ego.lane)\nrequire 5 < (distance to other) < 20",
+        f""",
+meant(lane, region) AS (VALUES {_meant(lambda lane: [lane.group])}),
+here AS (SELECT m.frame, m.region AS lane, r.region FROM memberships m JOIN meant r ON r.lane = m.region
+         WHERE m.object = 'ego' AND m.kind = 'lane' AND m.distance <= 0.05)
+SELECT DISTINCT a.frame FROM objects a JOIN ego USING (frame)
+JOIN memberships m ON m.frame = a.frame AND m.object = a.id JOIN here h ON h.frame = a.frame AND h.region = m.region
+WHERE a.class = 'Car' AND m.distance <= 0.25 AND a.ego_distance > 5 AND a.ego_distance < 20
+AND abs(a.relative_heading) <= radians(25) AND NOT EXISTS (
+    FROM memberships n WHERE n.frame = a.frame AND n.object = a.id AND n.region = h.lane AND n.distance <= 0)""",
+    ),
+    "a car on a crossing ahead": _driving(
+        "other = new Car at ego offset by (Range(-8, 8), Range(0, 30)), facing Range(-180, 180) deg\n"
+        "require other.position in crossing",
+        f"""
+SELECT DISTINCT a.frame FROM objects a JOIN ego USING (frame)
+WHERE a.class = 'Car' AND off(a.ego_right, a.ego_ahead, -8, 8, 0, 30) <= 0.25
+AND {_near("a.frame", "a.id", "('crossing')", 0.0)}""",
+    ),
+    "a cone on the shoulder": _driving(
+        "cone = new Cone on shoulder, facing Range(-180, 180) deg\nrequire (distance to cone) < 20",
+        f"""
+SELECT DISTINCT a.frame FROM objects a JOIN ego USING (frame)
+WHERE a.class = 'Cone' AND a.ego_distance < 20 AND {_near("a.frame", "a.id", "('shoulder')")}""",
+    ),
+    "near an intersection": _driving(
+        "require (distance from ego to intersection) < 10\nother = new Car on road\nrequire (distance to other) < 20",
+        f""",
+crossing(x0, y0, x1, y1) AS (VALUES {CROSSINGS}),
+near AS (SELECT frame FROM ego WHERE EXISTS (FROM crossing WHERE off(ego_x, ego_y, x0, x1, y0, y1) < 10))
+SELECT DISTINCT a.frame FROM objects a JOIN near USING (frame)
+WHERE a.class = 'Car' AND a.ego_distance < 20 AND along(a.heading, a.road_directions, radians(5))
+AND {_near("a.frame", "a.id", DRIVABLE)}""",
+    ),
+    "two in one intersection": _driving(
+        "one = new Car in intersection, facing Range(-180, 180) deg\n"
+        "two = new Truck in intersection, facing Range(-180, 180) deg\n"
+        "require network.intersectionAt(one) is network.intersectionAt(two)",
+        """,
+inside AS (SELECT a.frame, a.class, CASE WHEN m.distance <= 0.05 THEN m.region END AS region
+           FROM objects a JOIN ego USING (frame) JOIN memberships m ON m.frame = a.frame AND m.object = a.id
+           WHERE m.kind = 'intersection' AND m.distance <= 0.25)
+SELECT DISTINCT a.frame FROM inside a JOIN inside b ON b.frame = a.frame AND a.region IS NOT DISTINCT FROM b.region
+WHERE a.class = 'Car' AND b.class = 'Truck'""",
+    ),
+    "a cyclist on another's road": _driving(
+        "car = new Car on road\nbike = new Bicycle in car.road, facing Range(-180, 180) deg\n"
+        "require (distance from car to bike) < 10\nrequire (distance to car) < 20",
+        f""",
+meant(lane, region) AS (VALUES {_meant(lambda lane: [lane.road])}),
+car AS (SELECT a.frame, a.x, a.y, r.region FROM objects a JOIN ego USING (frame)
+        JOIN memberships m ON m.frame = a.frame AND m.object = a.id JOIN meant r ON r.lane = m.region
+        WHERE a.class = 'Car' AND a.ego_distance < 20 AND along(a.heading, a.road_directions, radians(5))
+        AND m.kind = 'lane' AND m.distance <= 0.05)
+SELECT DISTINCT c.frame FROM car c JOIN objects b ON b.frame = c.frame
+JOIN memberships m ON m.frame = b.frame AND m.object = b.id AND m.region = c.region
+WHERE b.class = 'Bicycle' AND m.distance <= 0.25 AND sqrt((b.x - c.x) ** 2 + (b.y - c.y) ** 2) < 10""",
     ),
 }

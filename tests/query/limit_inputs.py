@@ -136,6 +136,8 @@ EXTRA = {
     "who is fast": "ego = new Car\nother = new Car offset by (Range(-9, 9), Range(2, 20))\n"
     "require (Uniform(ego, other)).speed > 3",
     "looked up": "ego = new Car\nother = new Car on ego.lane",
+    "near an intersection": "ego = new Car\nother = new Car offset by (Range(-9, 9), Range(2, 20))\n"
+    "require (distance from ego to intersection) < 10",
     "one lane": "ego = new Car on network.lanes[0]\nother = new Car on network.lanes[0]",
     "one gap for all": "gap = Range(3, 6)\nego = new Car\nlast = ego\nfor i in range(3):\n"
     "    last = new Car ahead of last by gap",

@@ -125,6 +125,7 @@ REACHED: dict[str, str] = {
     "joined_pairs": "frames: row",
     "named_regions": "frames: one lane",
     "related_regions": "frames: looked up",
+    "region_boxes": "frames: near an intersection",
     "heading_terms": "frames: figure 3",
     "sql_alternatives": "frames: figure 3",
     "sql_characters": "frames: figure 3",

@@ -41,7 +41,7 @@ from scenicq.limits import LIMITS
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import SLACK, Tolerance
 from scenicq.query.prefilter.map_relations import MapRelations, shared_look_ups
-from scenicq.query.prefilter.regions import RegionNames, near_region
+from scenicq.query.prefilter.regions import RegionNames, near_region, nearest_box
 from scenicq.query.prefilter.sql_bounds import ARITHMETIC, SqlBounds
 from scenicq.query.prefilter.sql_ends import SQL, Expr, all_of, any_of, between, less, modulo_turn, number
 from scenicq.store.schema import MEMBERSHIP_RADIUS_M
@@ -126,8 +126,12 @@ class ConditionReader:
                 for index, (alias, prefix) in aliases.items()
                 for name, column in object_columns(alias, prefix).items()
             }
-            self.bounds[objects] = SqlBounds(columns)
+            self.bounds[objects] = SqlBounds(columns, self._nearest)
         return self.bounds[objects]
+
+    def _nearest(self, region: Region, x: str, y: str) -> str | None:
+        """How near a region may be to the ego: objects are too many to look at each box for each of them."""
+        return nearest_box(region, self.names, x, y) if (x, y) == (f"{EGO}.ego_x", f"{EGO}.ego_y") else None
 
     def involved(self, *roots: Node, about: int | None = None) -> tuple[int, ...]:
         """The objects that expressions are about, the ego left out."""

@@ -307,6 +307,7 @@ def run_players(
     Returns:
         The columns `f`, `row`, `r0` ..., in the order of the rows.
     """
+    _name(connection, plan)
     views = ", ".join(f"{view} AS ({sql})" for view, sql in _rows_of(dataset, connection, block))
     found: Any = connection.execute(f"WITH {views} {plan.players}").fetchnumpy()
     order = np.argsort(found["row"], kind="stable")
@@ -338,6 +339,7 @@ def run_plan(
     """
     views = iter(views)
     asked = list(islice(views, 1))
+    _name(connection, plan)
     rows = "".join(f"WITH {view} AS ({sql}) " for view, sql in asked)
     found: Any = connection.execute(rows + plan.columns).fetchnumpy()
     order = np.argsort(found["f"])
@@ -347,7 +349,6 @@ def run_plan(
         return missed
     connection.register(PASSED, pa.table({"f": left}))
     _open(connection, chain(asked, views))
-    _name(connection, plan)
     for place, stage in enumerate(plan.stages):
         for statement in stage.statements:
             connection.execute(statement)

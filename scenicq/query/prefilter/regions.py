@@ -6,16 +6,17 @@ import hashlib
 from collections.abc import Sequence
 from functools import cached_property
 
+from scenicq.geometry import shapes
 from scenicq.geometry.network import Network
-from scenicq.geometry.regions import PolygonSet, Region, UnionOf
+from scenicq.geometry.regions import PolygonSet, PolylineSet, Region, UnionOf
 from scenicq.limits import LIMITS
 from scenicq.match.tolerance import SLACK
 from scenicq.query.prefilter.sql_ends import number
 from scenicq.store.sql import sql_text
 
-__all__ = ["RegionNames", "named", "near_region", "region_ids"]
+__all__ = ["RegionNames", "named", "near_region", "nearest_box", "region_ids"]
 
-_FEW = 8
+_WRITTEN_OUT = 8
 """Names that are written out."""
 
 
@@ -24,7 +25,7 @@ class RegionNames:
 
     Attributes:
         kinds: The kinds of map element whose union a region is, by the region's identity.
-        tables: The query of each table of names that conditions ask for. The table's name says what is in it.
+        tables: The query of each table that conditions ask for. The table's name says what is in it.
     """
 
     def __init__(self, network: Network) -> None:
@@ -40,14 +41,18 @@ class RegionNames:
             id(network.drivableRegion): ("lane", "road", "intersection", "drivable"),
         }
 
-    def table(self, columns: str, *rows: Sequence[str]) -> str:
-        """The table of some names, which is made once for a connection.
+    def table(self, columns: str, *rows: Sequence[str] | Sequence[float]) -> str:
+        """The table of some names or numbers, which is made once for a connection.
 
         Args:
             columns: The names of its columns, `one` or `one, other`.
-            rows: The names in each column, as many in each.
+            rows: What is in each column, as many in each.
         """
-        lists = [f"[{', '.join(map(sql_text, column))}]::VARCHAR[]" for column in rows]
+        lists = [
+            f"[{', '.join(sql_text(each) if isinstance(each, str) else repr(each) for each in column)}]"
+            f"::{'DOUBLE' if column and isinstance(column[0], float) else 'VARCHAR'}[]"
+            for column in rows
+        ]
         query = f"SELECT {', '.join(f'unnest({each})' for each in lists)}"
         name = f"names_{hashlib.blake2b(query.encode(), digest_size=8).hexdigest()}"
         self.tables[f"{name}({columns})"] = query
@@ -95,6 +100,31 @@ def near_region(region: Region, names: RegionNames, reach: float) -> str | None:
     return conditions[0] if len(found) == 1 else f"({' OR '.join(conditions)})"
 
 
+def nearest_box(region: Region, names: RegionNames, x: str, y: str) -> str | None:
+    """SQL of the distance in metres from a point to the nearest box around a piece of a region: none is nearer.
+
+    Args:
+        region: The region.
+        names: Gets the table of boxes.
+        x: SQL of the point's coordinate.
+        y: The same.
+
+    Returns:
+        None if the region is not made of pieces, or has too many.
+    """
+    parts = region.parts if isinstance(region, UnionOf) else (region,)
+    pieces = [piece for part in parts if isinstance(part, PolygonSet | PolylineSet) for piece in part.pieces]
+    made = all(isinstance(part, PolygonSet | PolylineSet) for part in parts)
+    if not made or not 0 < len(pieces) <= LIMITS.region_boxes:
+        return None
+    table = names.table("west, south, east, north", *zip(*map(shapes.bounds_of, pieces), strict=True))
+    aside, ahead = (
+        f"greatest({low} - {at}, {at} - {high}, 0)" for at, low, high in ((x, "west", "east"), (y, "south", "north"))
+    )
+    # `greatest` passes over what is null
+    return f"(SELECT min(sqrt({aside} * {aside} + {ahead} * {ahead}) + 0 * ({x} + {y})) FROM {table})"
+
+
 def region_ids(region: Region, names: RegionNames) -> tuple[str, ...] | None:
     """The regions of `memberships` that a region is made of; None if it is not made of elements of the map."""
     found: list[str] = []
@@ -130,6 +160,6 @@ def _chosen(area: PolygonSet, names: RegionNames) -> str | None:
 
 def named(ids: Sequence[str], names: RegionNames) -> str:
     """Some names as the right side of `IN`: a table is hashed, a list is gone through for every row."""
-    if len(ids) <= _FEW:
+    if len(ids) <= _WRITTEN_OUT:
         return f"({', '.join(map(sql_text, ids)) or 'NULL'})"
     return f"(FROM {names.table('region', ids)})"

@@ -17,7 +17,19 @@ from typing import TypeAlias
 from scenicq.forest.interpret import OnMap, RegionNode, interpret, steps_of
 from scenicq.forest.interval_values import Interval, IntervalValue, IntervalVector, Truth
 from scenicq.forest.intervals import IntervalDomain
-from scenicq.forest.nodes import ArithmeticOp, CompareOp, DiscreteRange, Feature, Leaf, LogicOp, Node, Value
+from scenicq.forest.nodes import (
+    ArithmeticOp,
+    CompareOp,
+    Constant,
+    DiscreteRange,
+    Distance,
+    Feature,
+    Leaf,
+    LogicOp,
+    Node,
+    Value,
+)
+from scenicq.geometry.regions import Region
 from scenicq.limits import LIMITS
 from scenicq.match.tolerance import SLACK
 from scenicq.query.prefilter.sql_ends import SQL, Expr, any_of
@@ -42,9 +54,11 @@ class SqlBounds:
 
     Attributes:
         columns: The columns; a feature without one is unbounded.
+        nearest: SQL of a lower bound of the distance from a point, given as SQL, to a region, if there is one.
     """
 
     columns: Columns
+    nearest: Callable[[Region, str, str], str | None] = lambda region, x, y: None
     _known: dict[int, Alternatives] = field(default_factory=dict["int", "Alternatives"])
     _kept: list[Node] = field(default_factory=list[Node])
 
@@ -84,8 +98,19 @@ class SqlBounds:
             domain = IntervalDomain(SQL, self._column, slack=SLACK, boxed=False)
             # what is known by its id must stay: another node would get the id, and with it the bounds
             self._kept.append(root)
-            self._known = interpret(steps_of(root), _Alternatives(domain), self._known)
+            self._known = interpret(steps_of(root), _Alternatives(domain, self._distance), self._known)
         return self._known[id(root)]
+
+    def _distance(self, node: OnMap, args: Sequence[Alternatives]) -> Alternatives | None:
+        """Bounds of the distance from a known point to a region of the map."""
+        if not (isinstance(node, Distance) and isinstance(node.region, Constant) and len(args[1]) == 1):
+            return None
+        region, (point,) = node.region.value, args[1]
+        if not (isinstance(region, Region) and isinstance(point, IntervalVector) and point.x.exact and point.y.exact):
+            return None
+        x, y = point.x.low, point.y.low
+        low = self.nearest(region, x, y) if isinstance(x, str) and isinstance(y, str) else None
+        return None if low is None else (Interval(low, math.inf),)
 
     def _column(self, node: Feature) -> IntervalValue[Expr]:
         column = self.columns.get((node.object, node.property))
@@ -97,8 +122,13 @@ class SqlBounds:
 class _Alternatives:
     """Operations on alternatives: those of the domain on each combination of them."""
 
-    def __init__(self, domain: IntervalDomain[Expr]) -> None:
+    def __init__(
+        self,
+        domain: IntervalDomain[Expr],
+        on_map: Callable[[OnMap, Sequence[Alternatives]], Alternatives | None],
+    ) -> None:
         self.domain = domain
+        self.known_on_map = on_map
 
     def constant(self, value: Value) -> Alternatives:
         return (self.domain.constant(value),)
@@ -150,7 +180,8 @@ class _Alternatives:
         return self._few([each for option in options for each in option])
 
     def on_map(self, node: OnMap, args: Sequence[Alternatives]) -> Alternatives:
-        return self._each(lambda *chosen: self.domain.on_map(node, chosen), args)
+        known = self.known_on_map(node, args)
+        return self._each(lambda *chosen: self.domain.on_map(node, chosen), args) if known is None else known
 
     def region(self, node: RegionNode, args: Sequence[Alternatives]) -> Alternatives:
         return self._each(lambda *chosen: self.domain.region(node, chosen), args)
