@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import cast
 
 import numpy as np
@@ -29,26 +29,34 @@ def lane_direction(features: Iterable[MapFeature]) -> RoadDirection:
     return RoadDirection(_directed(features, "lane"))
 
 
-def road_direction(features: Iterable[MapFeature], ahead: Iterable[str] = ()) -> RoadDirection:
+def road_direction(features: Iterable[MapFeature], ahead: Callable[[], Iterable[str]] | None = None) -> RoadDirection:
     """The direction of traffic: that of the lanes, and of shoulders off roads and intersections, if these have one.
 
     Args:
         features: Of those with the same id the first counts.
-        ahead: The ids of lanes that come before the others, in this order.
+        ahead: Gives the ids of lanes that come before the others, in this order; asked when a direction is.
     """
     features = tuple(features)
-    beside = _directed(features, "shoulder")
+    lanes, beside = _of_kind(features, "lane"), _directed(features, "shoulder")
     taken = tuple(each.shape for each in features if each.kind in ("intersection", "road"))
-    ranks = {id_: rank for rank, id_ in enumerate(dict.fromkeys(ahead))}
-    ordered = sorted(features, key=lambda each: ranks.get(each.id, len(ranks)))
-    return RoadDirection(_directed(ordered, "lane"), beside=beside, taken=taken if beside else ())
+
+    def order() -> list[int]:
+        ranks = {id_: rank for rank, id_ in enumerate(dict.fromkeys(() if ahead is None else ahead()))}
+        return sorted(range(len(lanes)), key=lambda number: ranks.get(lanes[number].id, len(ranks)))
+
+    directed = tuple(DirectedLane(each.shape, centerlines(each)) for each in lanes)
+    return RoadDirection(directed, beside=beside, taken=taken if beside else (), order=None if ahead is None else order)
 
 
-def _directed(features: Iterable[MapFeature], kind: str) -> tuple[DirectedLane, ...]:
+def _of_kind(features: Iterable[MapFeature], kind: str) -> list[MapFeature]:
     kept: dict[str, MapFeature] = {}
     for feature in features:
         kept.setdefault(feature.id, feature)
-    return tuple(DirectedLane(each.shape, centerlines(each)) for each in kept.values() if each.kind == kind)
+    return [each for each in kept.values() if each.kind == kind]
+
+
+def _directed(features: Iterable[MapFeature], kind: str) -> tuple[DirectedLane, ...]:
+    return tuple(DirectedLane(each.shape, centerlines(each)) for each in _of_kind(features, kind))
 
 
 def direction_along(features: Iterable[MapFeature], kind: str) -> RoadDirection | None:

@@ -76,8 +76,13 @@ class Network:
     @cached_property
     def roadDirection(self) -> RoadDirection:
         """The direction of traffic, where lanes overlap that of ways through intersections first, as Scenic has it."""
+        # elements are linked when a direction is asked for: many a program never does
+        return road_direction(self.features, self._ways)
+
+    def _ways(self) -> list[str]:
+        """The lanes through intersections, in the order of their maneuvers."""
         ways = (each.connectingLane for crossing in self.intersections for each in crossing.maneuvers)
-        return road_direction(self.features, [lane.id for lane in ways if lane is not None])
+        return [lane.id for lane in ways if lane is not None]
 
     # --- elements
 

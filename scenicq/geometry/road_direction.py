@@ -8,7 +8,7 @@ all of these, the nearest lane within 20 m counts. What ties within a nanometre 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
@@ -45,6 +45,7 @@ class RoadDirection:
         elsewhere: Polylines whose nearest segment counts where there is none of both; if there are none, the nearest
             lane does.
         farthest: Metres within which it does.
+        order: Gives the numbers of the lanes in the order in which they count where they overlap; asked once.
     """
 
     lanes: tuple[DirectedLane, ...] = field(repr=False)
@@ -53,11 +54,12 @@ class RoadDirection:
     taken: tuple[Shape, ...] = field(default=(), repr=False, kw_only=True)
     elsewhere: tuple[Coordinates, ...] = field(default=(), repr=False, kw_only=True)
     farthest: float = field(default=REACH, kw_only=True)
+    order: Callable[[], Sequence[int]] | None = field(default=None, repr=False, kw_only=True)
 
     @property
     def is_nowhere(self) -> bool:
         """Whether nothing has a direction."""
-        return not len(self._lanes) and not len(self._beside) and not len(self._elsewhere)
+        return not any(len(DirectedAreas((lane,))) for lane in (*self.lanes, *self.beside)) and not self.elsewhere
 
     @property
     def reach(self) -> tuple[Sequence[Shape], float] | None:
@@ -117,7 +119,9 @@ class RoadDirection:
 
     @cached_property
     def _lanes(self) -> DirectedAreas:
-        return DirectedAreas(self.lanes)
+        return DirectedAreas(
+            self.lanes if self.order is None else tuple([self.lanes[number] for number in self.order()])
+        )
 
     @cached_property
     def _beside(self) -> DirectedAreas:
