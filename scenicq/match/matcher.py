@@ -29,7 +29,6 @@ from scenicq.match.problem.outcome import Outcome
 from scenicq.match.problem.preprocess import ready
 from scenicq.match.search.backtracking import Reporter
 from scenicq.match.search.batch_lookups import look_up_positions
-from scenicq.match.search.first_fit import FailedBatch
 from scenicq.match.search.label_search import LabelSearch
 from scenicq.match.search.plan_cache import PlanCache
 from scenicq.match.search.verdict_builder import VerdictBuilder
@@ -89,12 +88,7 @@ class Matcher:
         return next(self._decided([(label, among)], MapLookups(), reporter, given or {}))
 
     def match_all(self, labels: Sequence[Asked], *, details: bool = True) -> Iterator[Verdict]:
-        """Decide labels, each as `match` does.
-
-        Args:
-            labels: The labels.
-            details: Whether somebody reads of those that do not match more than which constraint fails.
-        """
+        """Decide labels, each as `match` does; without details only which constraint fails is told of a no."""
         lookups = look_up_positions(self.plans.plans.values(), self.scenario.ego, labels)
         return self._decided(labels, lookups, None, {}, details=details)
 
@@ -132,25 +126,16 @@ class Matcher:
         return ask(items, self.options, self.solver)
 
     def _decided(
-        self,
-        labels: Sequence[Asked],
-        lookups: MapLookups,
-        reporter: Reporter | None,
-        given: Mapping[str, str],
-        *,
-        details: bool = True,
-    ) -> Iterator[Verdict]:
+        self, labels: Sequence[Asked], lookups: MapLookups, reporter: Reporter | None, given: Mapping[str, str],
+        *, details: bool = True,
+    ) -> Iterator[Verdict]:  # fmt: skip
         """The verdicts of labels: by first fit side by side, else each by a search of its own."""
         found: dict[int, Verdict] = {}
         time_for_all = limited(self.options.timeout_s * len(labels))
         with suppress(Exhausted), time_for_all, limited(self.options.timeout_s * len(labels) / 2):
             for fit, rows in self.plans.first_fits(labels, given).items():
                 for batch in fit.fill(rows, self.options, lookups):
-                    if isinstance(batch, FailedBatch):
-                        outcomes = batch.outcomes(self.options, lookups) if details else None
-                        found.update(self._verdicts.failed(batch, outcomes))
-                    else:
-                        found.update(self._verdicts.matches(fit, batch))
+                    found.update(self._verdicts.of_batch(fit, batch, lookups if details else None))
         for number, label in enumerate(labels):
             verdict = found.get(number)
             if verdict is None:

@@ -11,7 +11,8 @@ from scenicq.forest.nodes import Leaf, Value
 from scenicq.forest.scenario import Scenario
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.constraints import describe_constraint, unobserved_motion
-from scenicq.match.problem.outcome import UNOBSERVED, Outcome, Refuted, Undecided
+from scenicq.match.problem.map_lookups import MapLookups
+from scenicq.match.problem.outcome import UNOBSERVED, Refuted, Undecided
 from scenicq.match.search.first_fit import FailedBatch, FilledBatch, FirstFit
 from scenicq.match.search.label_search import Failure, LabelSearch, Solution
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown, Verdict, WitnessValue
@@ -49,8 +50,25 @@ class VerdictBuilder:
         keys = self._named([leaf for leaf, _ in known])
         return Match(self.names(label, solution.assignment), _witness(keys, [value for _, value in known]))
 
-    def matches(self, fit: FirstFit, batch: FilledBatch) -> Iterator[tuple[int, Match]]:
-        """The matches of labels whose roles are filled, with their places."""
+    def of_batch(
+        self, fit: FirstFit, batch: FilledBatch | FailedBatch, lookups: MapLookups | None
+    ) -> Iterator[tuple[int, Match | NoMatch]]:
+        """The verdicts of labels that first fit decides, with their places.
+
+        Args:
+            fit: The plan.
+            batch: The labels.
+            lookups: What is known of the map, if somebody reads more of a no than which constraint fails; a label of
+                which there is no more to say then gets no verdict.
+        """
+        if isinstance(batch, FilledBatch):
+            return self._matches(fit, batch)
+        if lookups is not None:
+            return self._failures(fit, batch, lookups)
+        verdict = NoMatch(self._cause(Refuted(batch.constraint)))
+        return ((row.number, verdict) for row in batch.rows)
+
+    def _matches(self, fit: FirstFit, batch: FilledBatch) -> Iterator[tuple[int, Match]]:
         keys = self._named(batch.variables)
         owners = sorted(fit.ranks.items())
         ranks = [(self.scenario.objects[index].name, rank) for index, rank in owners]
@@ -59,23 +77,11 @@ class VerdictBuilder:
             names = {name: objects[numbers[rank] - 1].id if numbers[rank] else "ego" for name, rank in ranks}
             yield row.number, Match(names, _witness(keys, values))
 
-    def failed(self, batch: FailedBatch, outcomes: Iterator[Outcome | None] | None) -> Iterator[tuple[int, NoMatch]]:
-        """The verdicts of labels that do not match, with their places.
-
-        Args:
-            batch: The labels.
-            outcomes: What is said of each, if somebody reads it; a label of which it is None gets no verdict.
-        """
-        if outcomes is None:
-            constraint = batch.constraint
-            what = describe_constraint(self.scenario, constraint)
-            verdict = NoMatch(Cause(what, "", constraint.span, _about(constraint)))
-            yield from ((row.number, verdict) for row in batch.rows)
-            return
-        owners = sorted(batch.ranks.items())
+    def _failures(self, fit: FirstFit, batch: FailedBatch, lookups: MapLookups) -> Iterator[tuple[int, NoMatch]]:
+        outcomes = batch.outcomes(self.options, lookups)
         for row, numbers, outcome in zip(batch.rows, batch.numbers, outcomes, strict=True):
             if isinstance(outcome, Refuted):
-                assignment = {index: numbers[rank] for index, rank in owners if rank < len(numbers)}
+                assignment = {index: numbers[rank] for index, rank in fit.ranks.items() if rank < len(numbers)}
                 yield row.number, NoMatch(self._cause(outcome), self.names(row.label, assignment))
 
     def without_match(self, label: Label, search: LabelSearch, ended: Exhausted | None) -> tuple[int, Verdict]:
