@@ -48,7 +48,7 @@ REACHED: dict[str, str] = {
     "value_items": "frames: crowd",
     "value_nesting": "language: lists",
     "integer_bits": "language: whole numbers",
-    "choice_options": "frames: figure 3",
+    "choice_options": "frames: picked lane",
     "condition_courses": "frames: figure 3",
     "region_parts": "frames: not visible",
     "random_way_steps": "frames: follow",

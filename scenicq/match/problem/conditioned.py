@@ -30,7 +30,16 @@ from scenicq.forest.nodes import (
 from scenicq.forest.scenario import Requirement
 from scenicq.forest.walk import children, postorder
 
-__all__ = ["Item", "condition_group", "conditioned", "fact", "item_conjuncts", "options_of", "uses_field"]
+__all__ = [
+    "Item",
+    "condition_group",
+    "conditioned",
+    "fact",
+    "item_conjuncts",
+    "options_of",
+    "uses_far_field",
+    "uses_field",
+]
 
 Item = tuple[Constraint, Node, Value]
 """A constraint, what conditioning left of its expression, and the label's value if it is a comparison."""
@@ -39,6 +48,13 @@ Item = tuple[Constraint, Node, Value]
 def uses_field(items: Iterable[Item]) -> bool:
     """Whether constraints ask a vector field at a point that conditioning left unknown."""
     return any(isinstance(node, DirectionAt) for node in postorder([node for _, node, _ in items]))
+
+
+def uses_far_field(items: Sequence[Item]) -> bool:
+    """Whether they ask a vector field at a point that no label observes, so that much of the map may count."""
+    seen = {id(node) for constraint, node, _ in items if getattr(constraint, "property", "") == "position"}
+    fields = [node for node in postorder([node for _, node, _ in items]) if isinstance(node, DirectionAt)]
+    return any(not isinstance(node.point, Constant) and id(node.point) not in seen for node in fields)
 
 
 def condition_group(group: Group, observed: Observation, scope: Mapping[Identity, Value] | None = None) -> list[Item]:

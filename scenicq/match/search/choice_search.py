@@ -28,7 +28,7 @@ from scenicq.forest.nodes import (
 )
 from scenicq.limits import LIMITS, exhausted
 from scenicq.match.problem.bipartite_matching import Slot
-from scenicq.match.problem.conditioned import Item, conditioned, fact, item_conjuncts, uses_field
+from scenicq.match.problem.conditioned import Item, conditioned, fact, item_conjuncts, uses_far_field
 from scenicq.match.problem.evaluation import ground_cause, holds
 from scenicq.match.problem.outcome import POSTPONED, Outcome, Patience, Refuted, Satisfied, Undecided
 from scenicq.match.search.backtracking import Consistency, find_assignments
@@ -153,7 +153,7 @@ class _ChoiceSearch:
         """A witness over all outcomes together, where fields at hidden points make each of them costly to decide."""
         fewest = _SEVERAL if self.patience is Patience.LITTLE else 2
         several = not self.depth and math.prod(len(domain.rows) for domain in self.domains) >= fewest
-        if not several or not uses_field(self.items):
+        if not several or not uses_far_field(self.items):
             return None
         from scenicq.match.fields.witness_search import AGAIN, QUICK, search_witness  # noqa: PLC0415 - takes long to load
 

@@ -12,9 +12,10 @@ from shapely import LineString
 
 from scenicq.geometry.features import MapFeature
 from scenicq.geometry.network import Network
-from scenicq.match.fields import field_solver, heading_propagation
+from scenicq.match.fields import field_solver, heading_propagation, witness_search
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
+from scenicq.match.search import choice_search
 from scenicq.match.tolerance import parse_tolerance
 from scenicq.match.verdict import Match, NoMatch
 from scenicq.store.labels import Label, LabelObject
@@ -101,3 +102,23 @@ def test_unlikely_values_are_looked_at_last(monkeypatch):
         assert isinstance(verdict, Match)
         assert verdict.correspondence["other"] == "found"
     assert len(asked) < 30, "the way of one that is aside is not looked for over hundreds of metres"
+
+
+def test_directions_at_known_places_are_no_matter_of_trial(monkeypatch):
+    """Which of several ways that overlap is meant is then decided outcome by outcome, each in no time."""
+
+    def unwanted(*_, **__):
+        raise AssertionError("a search")
+
+    monkeypatch.setattr(choice_search, "_SEVERAL", 2)
+    monkeypatch.setattr(witness_search, "search_witness", unwanted)
+    scenario = compiled("model scenic.domains.driving.model\nego = new Car on Uniform(*network.lanes)\n", junction())
+    matcher = Matcher(scenario, MatchOptions(tolerance=TOLERANCE))
+    for heading, kind in ((0.0, Match), (-math.pi / 2, Match), (0.4, NoMatch)):
+        label = Label("f", "r", 0, "junction", LabelObject("ego", "Car", "", 0.5, 0.5, heading), ())
+        assert isinstance(matcher.match(label), kind)
+    hidden = "spot = new OrientedPoint on Uniform(*network.lanes)\nego = new Car at spot offset by (0, Range(2, 9))\n"
+    with pytest.raises(AssertionError, match="a search"):
+        Matcher(
+            compiled("model scenic.domains.driving.model\n" + hidden, junction()), MatchOptions(tolerance=TOLERANCE)
+        ).match(Label("f", "r", 0, "junction", LabelObject("ego", "Car", "", 0.5, 0.5, 0.0), ()))
