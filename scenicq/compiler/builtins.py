@@ -10,8 +10,9 @@ from collections.abc import Callable
 from typing import Any, cast
 
 from scenicq.compiler import operators
-from scenicq.compiler.arithmetic import hashed, is_random, plain_binary
+from scenicq.compiler.arithmetic import hashed, is_random
 from scenicq.compiler.coerce import kind_of_model, to_scalar, to_vector
+from scenicq.compiler.comparisons import binary
 from scenicq.compiler.courses import as_test
 from scenicq.compiler.distributions import DISTRIBUTIONS
 from scenicq.compiler.random_values import is_choice
@@ -97,9 +98,7 @@ _KNOWN_MATH: dict[str, Callable[..., Any]] = {
 
 
 def _power(span: Span, base: ModelValue, exponent: ModelValue) -> ModelValue:
-    if is_random(base) or is_random(exponent):
-        return build.arithmetic(ArithmeticOp.POW, to_scalar(base, span), to_scalar(exponent, span), span=span)
-    return plain_binary("**", base, exponent, span)
+    return binary("**", base, exponent, span)
 
 
 def mathematics() -> dict[str, ModelValue]:
@@ -222,9 +221,7 @@ def _sum(span: Span, values: ModelValue, start: ModelValue = 0) -> ModelValue:
     for value in _sequence(values, span):
         if isinstance(value, list | tuple | str):
             raise fail("wrong-type", "`sum` adds numbers", span, f"one is {describe(value)}")
-        symbolic = is_node(value) or is_node(total) or isinstance(value, Choice | Instance)
-        add = operators.binary if symbolic else plain_binary
-        total = add("+", total, value, span)
+        total = binary("+", total, value, span)
     return total
 
 

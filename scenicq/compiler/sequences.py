@@ -7,7 +7,7 @@ from functools import cmp_to_key
 from typing import TYPE_CHECKING, Any
 
 from scenicq.compiler import operators
-from scenicq.compiler.arithmetic import is_random, plain_binary
+from scenicq.compiler.arithmetic import is_random
 from scenicq.compiler.builtins import extreme, language_names, truth
 from scenicq.compiler.coerce import kind_of_model, to_scalar
 from scenicq.compiler.comparisons import compare
@@ -52,9 +52,7 @@ def sequence_functions(run: Interpreter) -> dict[str, ModelValue]:
 
     def less(one: ModelValue, other: ModelValue, span: Span) -> bool:
         run.budget.step(span)
-        if is_random(one) or is_random(other):
-            return known_truth(run, compare("<", one, other, span), span)
-        return plain_binary("<", one, other, span)
+        return known_truth(run, compare("<", one, other, span), span)
 
     def ordered(span: Span, items: ModelValue, key: ModelValue = None, reverse: ModelValue = False) -> ModelValue:
         keyed = [(_plain(as_constant(run, apply(key, item, span))), item) for item in items_of(run, items, span)]
