@@ -14,8 +14,10 @@ import math
 import random
 import re
 import sys
+from collections import ChainMap
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -452,8 +454,9 @@ class Program:
             lines += [f"monitor M{number}():\n    {body}", f"require monitor M{number}()"]
         return "\n".join(lines) + "\n"
 
-    def assignments(self) -> Iterator[Values]:
-        """Every value of the leaves."""
+    @cached_property
+    def assignments(self) -> list[Values]:
+        """Values of the leaves: one of all that give the choices that something hard reads the same values."""
         leaves: dict[str, tuple[float, ...]] = {}
         for choice in self.choices:
             for name, values in choice.leaves.items():
@@ -461,19 +464,30 @@ class Program:
                 leaves[name] = max(values, leaves.get(name, ()), key=len)
         if any(name in atom.text for atom in every_atom(self) for name in self.pairs()):
             leaves = {name: values if is_whole(values) else halved(values) for name, values in leaves.items()}
-        used = {name for choice in self.used() for name in choice.leaves}
-        leaves = {name: values if name in used else values[:1] for name, values in leaves.items()}
-        for values in itertools.product(*leaves.values()):
-            yield dict(zip(leaves, values, strict=True))
+        parts: list[list[Choice]] = []  # those that share a leaf
+        for choice in self.used(hard=True):
+            beside = [part for part in parts if any(choice.leaves.keys() & each.leaves for each in part)]
+            parts = [part for part in parts if part not in beside] + [[*itertools.chain(*beside), choice]]
+        found: list[list[Values]] = []
+        for part in parts:
+            names = list(dict.fromkeys(name for choice in part for name in choice.leaves))
+            ways: dict[tuple[float, ...], Values] = {}
+            for row in itertools.product(*(leaves[name] for name in names)):
+                values = dict(zip(names, row, strict=True))
+                ways.setdefault(tuple(choice.value(values) for choice in part), values)
+            found.append(list(ways.values()))
+        some = {name: values[0] for name, values in leaves.items()}
+        return [dict(ChainMap(*map(dict, way), some)) for way in itertools.product(*found)]
 
     def pairs(self) -> list[str]:
         """What conditions say that compare two random numbers."""
         names = [each.name for each in self.choices if each.number]
         return [f"{one} > {other}" for one in names for other in names]
 
-    def used(self) -> list[Choice]:
-        """The random variables that something reads, or that one of these is made of."""
-        text = " ".join(line for line in self.text().splitlines() if not re.match(r"[A-Z]\d ?=", line))
+    def used(self, *, hard: bool = False) -> list[Choice]:
+        """The random variables that something reads, or that one of these is made of; but for soft requirements."""
+        passed = r"[A-Z]\d ?=|require\[" if hard else r"[A-Z]\d ?="
+        text = " ".join(line for line in self.text().splitlines() if not re.match(passed, line))
         words = set(re.findall(r"\w+", text))
         for choice in reversed(self.choices):
             if choice.name in words:
@@ -679,7 +693,7 @@ def expected(program: Program, trace: Trace, binding: dict[str, str], i: int, *,
     atoms = list({each.text: each for each in every_atom(program)}.values())
     pieces = list(points(program, trace, binding, i, last, atoms, jointly=jointly))
     before = set[tuple[bool | None, ...]]()
-    for values, point in itertools.product(program.assignments(), pieces):
+    for values, point in itertools.product(program.assignments, pieces):
         situation = Situation(trace, binding, {**values, **point})
         if program.faces is not None and facing is not None and program.faces.value(values) != facing:
             continue
