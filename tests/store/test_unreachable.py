@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import shutil
+import subprocess
 import threading
 import time
 from collections.abc import Generator
@@ -193,3 +195,24 @@ def test_of_s3_itself(answer: bytes | None, words: str, run: Any, monkeypatch: p
         assert done.stderr.startswith("error[store-unreachable]: s3://fleet/town cannot be read")
         assert words in done.stderr
     s3fs.S3FileSystem.clear_instance_cache()
+
+
+@pytest.mark.parametrize(
+    ("answer", "words"), [(EXPIRED, "these credentials"), pytest.param(None, "cannot be read", marks=pytest.mark.slow)]
+)
+def test_the_installed_command_says_so_of_s3(answer: bytes | None, words: str, command: str) -> None:
+    pytest.importorskip("s3fs", reason="scenicq[s3] is not installed")
+    with _server(answer) as address:
+        env = {"AWS_ENDPOINT_URL": address, "AWS_ACCESS_KEY_ID": "a", "AWS_SECRET_ACCESS_KEY": "b"}
+        done = subprocess.run(
+            [command, "match", PROGRAM, "s3://fleet/town"],
+            env={**os.environ, **env, "AWS_DEFAULT_REGION": "us-east-1"},
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=150,
+        )
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith("error[store-unreachable]: s3://fleet/town cannot be read")
+    assert done.stderr.count("error[") == 1
+    assert words in done.stderr
