@@ -39,7 +39,7 @@ from scenicq.forest.nodes import (
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.walk import features, postorder
 from scenicq.geometry.network import Network
-from scenicq.geometry.regions import IntersectionOf, Region
+from scenicq.geometry.regions import Everywhere, IntersectionOf, Region
 from scenicq.limits import LIMITS
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.constraints import build_groups, relevant_properties
@@ -333,6 +333,8 @@ def _parts(root: Node) -> tuple[list[DiscAt | SectorAt], list[Region]]:
                 todo += region.parts
             case Constant(value=IntersectionOf() as value):
                 regions += value.parts
+            case Constant(value=Everywhere()):
+                pass
             case Constant() if isinstance(region.value, Region):
                 regions.append(region.value)
             case _:

@@ -131,10 +131,18 @@ def test_what_sql_decides_of_random_programs_has_a_proof(dataset, first):
 
 
 @pytest.mark.parametrize(
-    "name", ["range", "ahead", "options", "steps", "walker", "view", "seen", "around", "or", "two", "crossing"]
+    "name",
+    ["range", "ahead", "options", "steps", "walker", "view", "seen", "around", "or", "two", "crossing"],
 )
 def test_sql_decides_what_it_can(dataset, name):
     sure, left = check(dataset, SINGLE[name], OPTIONS["default"])
+    assert 2 * sure > left, (sure, left)
+
+
+@pytest.mark.parametrize("options", ["default", "exact", "box"])
+def test_sql_decides_what_may_lie_anywhere(dataset, options):
+    text = "ego = new Car\nother = new Car in everywhere, facing Range(0, 360) deg\nrequire (distance to other) < 20"
+    sure, left = check(dataset, text, OPTIONS[options])
     assert 2 * sure > left, (sure, left)
 
 
