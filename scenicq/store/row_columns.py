@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import Any, TypeVar
@@ -30,6 +31,7 @@ class RowColumns:
         self._metadata = self._file.metadata
         sizes = [self._metadata.row_group(group).num_rows for group in range(self._file.num_row_groups)]
         self._starts = np.cumsum([0, *sizes])
+        self._begins: list[int] = self._starts.tolist()
         leaves = self._metadata.schema
         self._leaf = {leaves.column(number).path: number for number in range(len(leaves))}
         self._texts: dict[tuple[str, int], Any] = {}
@@ -76,10 +78,10 @@ class RowColumns:
 
     def text(self, name: str, row: int) -> str:
         """The text in one row."""
-        group = int(np.searchsorted(self._starts, row, side="right")) - 1
+        group = bisect_right(self._begins, row) - 1
         if (name, group) not in self._texts:
             self._texts[name, group] = self._read(name, group)
-        return self._texts[name, group][row - int(self._starts[group])].as_py()
+        return self._texts[name, group][row - self._begins[group]].as_py()
 
     def _groups(self, rows: NDArray[np.int64]) -> Iterator[tuple[int, slice, NDArray[np.int64] | slice]]:
         """The groups that have some rows: each with which of them are its own, and their places in it."""
