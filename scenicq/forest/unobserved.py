@@ -49,7 +49,8 @@ def certain_and_possible(root: Node, unobserved: Callable[[Feature], bool]) -> T
     Returns:
         The condition itself twice where it reads nothing unobserved.
     """
-    return _Reader(unobserved).apart(root, LIMITS.unobserved_choices)
+    # each condition that is told apart doubles what is left
+    return _Reader(unobserved).apart(root, LIMITS.unobserved_choices // 2)
 
 
 def with_any_value(root: Node, unobserved: Callable[[Feature], bool]) -> Node:
@@ -103,7 +104,8 @@ class _Reader:
                 if kind_of(node) != "boolean":
                     return node
                 own, positive = without_negation(node)
-                return build.constant(value == positive) if self._number(own) == number else node
+                known = value if self._number(own) == number else self._follows(base, own, value=value)
+                return node if known is None else build.constant(known == positive)
 
             cases.append(self.apart(transform(root, given), splits - 1))
         (sure, may), (sure_not, may_not) = cases
@@ -128,11 +130,34 @@ class _Reader:
             for each in below:
                 if id(each) in reading and kind_of(each) == "boolean":
                     base, _ = without_negation(each)
-                    number = self._number(base)
-                    if number in seen and all(map(is_total, postorder((base,)))):
+                    bound = self._bound(base)
+                    asked = self._number(base) if bound is None else bound[0]
+                    if asked in seen and all(map(is_total, postorder((base,)))):
                         return base
-                    seen.add(number)
+                    seen.add(asked)
         return None
+
+    def _bound(self, base: Node) -> tuple[int, bool, float] | None:
+        """The number of what a comparison bounds, whether from above, and the bound, if that is a known number."""
+        match base:
+            case Compare(op=CompareOp.LT, left=left, right=Constant(value=float() as bound)):
+                return self._number(left), True, bound
+            case Compare(op=CompareOp.LT, left=Constant(value=float() as bound), right=right):
+                return self._number(right), False, bound
+            case _:
+                return None
+
+    def _follows(self, base: Node, other: Node, *, value: bool) -> bool | None:
+        """What another comparison comes out as where a first one does so, None if that does not tell."""
+        mine, theirs = self._bound(base), self._bound(other)
+        if mine is None or theirs is None or mine[0] != theirs[0]:
+            return None
+        (_, above, bound), (_, upper, limit) = mine, theirs
+        if above == value:  # less than the bound, or at most so much
+            inside, beyond = bound < limit or (bound == limit and above), bound <= limit
+            return (True if inside else None) if upper else (False if beyond else None)
+        inside, beyond = bound > limit or (bound == limit and not above), bound >= limit
+        return (False if beyond else None) if upper else (True if inside else None)
 
     def truths(self, root: Node, selects: int) -> Truths:
         """As `certain_and_possible`; at most so many choices inside one comparison are told apart."""

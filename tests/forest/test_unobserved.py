@@ -66,10 +66,12 @@ def test_what_is_sure_holds_for_all_completions_and_what_is_impossible_for_none(
 
 
 def repeated(chance: random.Random, depth: int):
-    """A condition of a few comparisons, asked for and denied again and again."""
+    """A condition of a few comparisons, asked for and denied again and again, with bounds that say of each other."""
     if depth == 0:
-        one = build.compare(chance.choice((CompareOp.LT, CompareOp.GE)), UNSEEN[chance.random() < 0.5], SEEN[0])
-        one = chance.choice((one, build.compare(CompareOp.GT, SEEN[0], one.left)))
+        bound = build.constant(chance.choice(NUMBERS))
+        unseen = UNSEEN[chance.random() < 0.5]
+        order = (CompareOp.LT, CompareOp.LE, CompareOp.GT, CompareOp.GE)
+        one = build.compare(chance.choice(order), *chance.choice(((unseen, bound), (bound, unseen))))
         return build.opposite(one) if chance.random() < 0.3 else one
     parts = [repeated(chance, depth - 1) for _ in range(2)]
     if chance.random() < 0.2:
@@ -79,14 +81,13 @@ def repeated(chance: random.Random, depth: int):
     return build.logic(chance.choice((LogicOp.AND, LogicOp.OR)), *parts)
 
 
-@pytest.mark.parametrize("seed", range(200))
+@pytest.mark.parametrize("seed", range(300))
 @pytest.mark.one_in(4)
 def test_what_is_asked_for_twice_is_told_exactly(seed):
-    root = repeated(random.Random(seed), 3)
+    root = repeated(random.Random(seed), 2)
     known = {(0, "a"): 1.0, (0, "b"): 0.0}
-    completions = {
-        value(root, known | {(1, "u"): u, (1, "v"): v}) for u, v in itertools.product((0.0, 1.0, 2.0), repeat=2)
-    }
+    numbers = (-2.0, *(each + half for each in NUMBERS for half in (0.0, 0.5)))
+    completions = {value(root, known | {(1, "u"): u, (1, "v"): v}) for u, v in itertools.product(numbers, repeat=2)}
     found = {value(each, known) for each in certain_and_possible(root, unobserved)}
     assert found == completions
 

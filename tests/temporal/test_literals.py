@@ -90,6 +90,8 @@ def test_the_start_and_what_follows_say_the_same_of_one_label(alone, start, over
         ("(a.speed > 4) and not (a.speed > 4)", None),
         ("(a.speed > 4) == (a.speed > 4)", "Match"),
         ("(a.speed > 4) or (a.speed < 3)", "Unknown"),
+        ("(a.speed > 4) or (a.speed < 5)", "Match"),
+        ("(a.speed > 4) and (a.speed <= 4)", None),
     ],
 )
 @pytest.mark.parametrize("form", ["require {}\nrequire always True\n", "require always ({})\n"])
