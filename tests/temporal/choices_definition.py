@@ -499,9 +499,10 @@ class Program:
         if len(self.roles) < 2 or self.faces is not None or self.place is not None:
             return True
 
-        used = {choice.name for choice in self.used()}
-        # a name that nothing reads says nothing
+        used = {choice.name for choice in self.used(hard=True)}
+        # neither a name that nothing reads nor a soft requirement says anything
         lines = [line for line in self.text().splitlines() if not re.match(r"[A-Z]\d ?=", line) or line[:2] in used]
+        lines = [line for line in lines if not line.startswith("require[")]
 
         def said(names: Mapping[str, str]) -> list[str]:
             text = "".join(names.get(word, word) for word in re.split(r"\b", "\n".join(lines)))
