@@ -6,40 +6,14 @@ from pathlib import Path
 
 import pytest
 from interval_definition import Program, Trace, bindings, matches, random_program, random_trace, recording_of
+from interval_queries import found_by_query
 
-from scenicq.errors import ScenarioError, Source
-from scenicq.query.execution.run import Query, QueryOptions
-from scenicq.store.dataset import open_dataset
 from scenicq.store.writer import write_dataset
 from scenicq.temporal.interval_options import IntervalOptions
 
 D_VALUES = [-3 + number / 4 for number in range(25)]
 """Every value of D that makes a difference: positions are whole numbers."""
 COMPLETIONS = 6
-
-
-def found_by_query(folder: Path, program: Program, **options):
-    """(recording, roles, verdict) and (i, j), of every result, whether or not somebody reads what others fail at."""
-    told, untold = (_found(folder, program, interval_reasons=each, **options) for each in (True, False))
-    assert told == untold, program.text()
-    return told
-
-
-def _found(folder: Path, program: Program, **options):
-    """The results of a query; none where no run satisfies the program."""
-    query = Query(open_dataset(folder), Source("p.scenic", program.text()), QueryOptions(**options))
-    try:
-        return [
-            (
-                (result.recording, tuple(sorted(result.verdict.correspondence.items())), type(result.verdict).__name__),
-                (int(result.frame.rpartition("-")[2]), int(result.interval.last.rpartition("-")[2])),
-            )
-            for result in query.results()
-        ]
-    except ScenarioError as error:
-        if error.diagnostics[0].code != "impossible-requirement":
-            raise
-        return []
 
 
 def truth_of(trace: Trace, binding, d, completion):

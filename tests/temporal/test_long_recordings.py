@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 from interval_definition import Sample, random_program, recording_of
-from test_intervals import found_by_query
+from interval_queries import found_by_query
 
 from scenicq.store.writer import write_dataset
 from scenicq.temporal.interval_options import IntervalOptions
