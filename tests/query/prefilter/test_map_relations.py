@@ -29,7 +29,10 @@ from scenicq.store.writer import write_dataset
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from nudged_scenes import STREET
 
-HEAD = "model scenic.domains.driving.model\nego = new Car in everywhere, facing Range(-180, 180) deg\n"
+HEAD = (
+    "from scenic.domains.driving.roads import ManeuverType\nmodel scenic.domains.driving.model\n"
+    "ego = new Car in everywhere, facing Range(-180, 180) deg\n"
+)
 ANY = "in everywhere, facing Range(-180, 180) deg"
 TOLERANCES = (EXACT, parse_tolerance("position=0.25,heading=5deg"), parse_tolerance("position=1.5,heading=20deg"))
 OWNERS = ("ego.lane", "ego.laneGroup", "ego.road", "ego.laneSection", "network.laneAt(ego)", "ego.oppositeLaneGroup")
@@ -47,6 +50,8 @@ NAMES = (
     "other._crossing",
     "other._road",
 )
+FARTHER = ("intersection", "crossing", "road", "ego.lane", "network.lanes[0]")
+TURNS = ("LEFT_TURN", "RIGHT_TURN", "STRAIGHT")
 
 
 def question(draw: random.Random) -> str:
@@ -68,6 +73,12 @@ def question(draw: random.Random) -> str:
                 "ego.lane is other.lane", "ego.road is other.road", f"ego._lane is network.elements['{lane}']",
                 f"not (other._lane is network.elements['{lane}'])", "ego.laneGroup is other._laneGroup",
                 "5 < (distance to other) < 20", f"other.position in {place}", "ego.lane is not other._lane",
+                f"other in {place}", f"not (other.position in {place})", f"not (other in {place})",
+                f"(distance from ego to {draw.choice(FARTHER)}) < {draw.choice([0.5, 3, 10])}",
+                f"(distance from other to {draw.choice(FARTHER)}) > {draw.choice([0.5, 3])}",
+                f"{draw.choice(['any', 'all'])}([m.type is ManeuverType.{draw.choice(TURNS)} "
+                "for m in ego.lane.maneuvers])",
+                f"len(ego.lane.maneuvers) {draw.choice(['>', '<', '=='])} {draw.choice([1, 2])}",
             ])
         )  # fmt: skip
     return HEAD + "\n".join(lines) + "\n"
