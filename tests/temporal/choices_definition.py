@@ -506,6 +506,7 @@ class Program:
 
         def said(names: Mapping[str, str]) -> list[str]:
             text = "".join(names.get(word, word) for word in re.split(r"\b", "\n".join(lines)))
+            text = re.sub(r", \w+: 0\b", "", text)  # an option without weight is none
             text = re.sub(r"from (\w+) to (\w+)", lambda m: "from {} to {}".format(*sorted(m.groups())), text)
             return sorted(re.sub(r"M\d", "M", text).splitlines())
 
