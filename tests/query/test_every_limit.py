@@ -69,7 +69,7 @@ REACHED: dict[str, str] = {
     "fit_decisions_a_role": "many",
     "ordered_slots": "frames: picked lane",
     "ordered_steps": "frames: picked lane",
-    "arc_roles": "frames: not visible",
+    "arc_roles": "frames: picked lane",
     "nested_outcomes": "frames: picked lane",
     "choice_tries": "frames: picked lane",
     "choice_nesting": "frames: alternatives",
