@@ -133,7 +133,8 @@ class ChoiceProblem:
                 above = [self.columns.get(leaf.identity, ()) for leaf in used if isinstance(leaf, Index)]
                 lookups.append(variable)
                 slots.append(frozenset(slot for each in (places, *above) for slot, _ in each))
-                others.append({leaf.identity for leaf in used if not isinstance(leaf, Index)})
+                # a choice without a slot, such as which of several lanes is meant, is one wherever it is asked
+                others.append({leaf.identity for leaf in used if leaf.identity not in self.columns})
         count = len(self.parts)
         return [
             Component(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import random
 import sys
@@ -12,7 +13,9 @@ import pytest
 
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import ScenarioError, Source
+from scenicq.forest.evaluate import evaluate
 from scenicq.forest.nodes import Constant, Index, PointIn, Select
+from scenicq.forest.walk import leaves
 from scenicq.geometry.regions import PolygonSet
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
@@ -177,6 +180,32 @@ def test_the_same_element_may_be_none(dataset: Dataset, kind: str, said: str):
     right = {each.frame for each in dataset.labels() if isinstance(matcher.match(each), Match)}
     for proofs in (False, True):
         assert set(verdicts(dataset, text, MatchOptions(), proofs=proofs)) == right
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        "all([m.type is ManeuverType.RIGHT_TURN for m in ego.lane.maneuvers])",
+        "any([m.type is ManeuverType.LEFT_TURN for m in ego.lane.maneuvers])",
+        "len(ego.lane.maneuvers) > 1 and not any([m.type is ManeuverType.LEFT_TURN for m in ego.lane.maneuvers])",
+        "all([m.type is ManeuverType.STRAIGHT for m in ego.lane.maneuvers]) and len(ego.lane.maneuvers) > 0",
+    ],
+)
+def test_one_of_the_elements_at_a_place_is_meant_throughout(dataset: Dataset, said: str):
+    """Plain evaluation, for each of them."""
+    scenario = ready(compile_scenario(Source("p.scenic", f"{HEAD}require {said}\n"), STREET))
+    conditions = tuple(each.condition for each in scenario.requirements if each.built_in is None)
+    chosen = {leaf.identity: len(leaf.weights) for leaf in leaves(*conditions) if isinstance(leaf, Index)}
+    matcher, several = Matcher(scenario, MatchOptions()), 0
+    for label in dataset.labels():
+        ego = {(0, "position"): (label.ego.x, label.ego.y), (0, "heading"): label.ego.heading}
+        right = any(
+            all(evaluate(each, dict(zip(chosen, map(float, ranks), strict=True)), ego) is True for each in conditions)
+            for ranks in itertools.product(*map(range, chosen.values()))
+        )
+        assert isinstance(matcher.match(label), Match) is right, label.frame
+        several += right
+    assert 0 < several < 150
 
 
 def test_sql_says_what_the_matcher_says(dataset: Dataset, rounds):
