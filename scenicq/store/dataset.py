@@ -159,8 +159,9 @@ class Dataset:
         # shapes are not for SQL, and DuckDB 1.5.0 refuses those without a coordinate reference system
         connection.execute("SET enable_geoparquet_conversion = false")
         self.place.admit(connection, (part for parts in self.manifest.tables.values() for part in parts))
-        for table in self.manifest.tables if views else ():
-            connection.execute(f"CREATE VIEW {table} AS FROM {self.scan(table)}")
+        with self.blamed():
+            for table in self.manifest.tables if views else ():
+                connection.execute(f"CREATE VIEW {table} AS FROM {self.scan(table)}")
         every = [file for table in self.manifest.tables for file in self.files(table)]
         connection.execute(f"SET allowed_paths = {sql_list(allowed_paths(every))}")
         connection.execute("SET enable_external_access = false")
@@ -272,7 +273,7 @@ class Dataset:
             elif self.place.checksum(part) != part.sha256:
                 problems.append(Diagnostic("store-damaged", f"{part.path} has changed since it was written"))
         if problems:
-            raise DataError(problems)
+            raise DataError(list(dict.fromkeys(problems)))
 
 
 def open_dataset(address: str | Path, *, older: bool = False, check: bool = True) -> Dataset:

@@ -127,7 +127,12 @@ class LocalFolder:
             return [
                 Diagnostic("store-damaged", f"{self.path}: folders of a dataset are no links: {told}", hints=(hint,))
             ]
-        return [problem for part in parts if (problem := _problem(self._root, part))]
+        found = [problem for part in parts if (problem := _problem(self._root, part))]
+        if found and not (self._root / MANIFEST).exists():
+            # whoever removes a dataset removes all of it
+            told = f"{self.path} is not there any more: it was removed or moved while it was read"
+            return [Diagnostic("store-damaged", told, hints=("ingest the source again",))]
+        return found
 
     def file(self, part: Part) -> Path:
         """Its absolute path."""
