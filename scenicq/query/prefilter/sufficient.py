@@ -187,14 +187,15 @@ class _Prover:
         nodes = postorder([each.expression for each in group.constraints])
         found = [look_up for node in nodes if isinstance(node, Select) and (look_up := look_up_of(node.index))]
         found += [place for places in equations for place in places]
+        allowed = [known for each in said if (known := allowed_elements(each))]
+        found += [look_up for look_up, _ in allowed]
         if not found:
             return None
         objects = {each.object for each in found}
         alike = all(each.occupancy is found[0].occupancy for each in found)
         if not alike or self.scenario.ego not in objects or len(objects) != 1 + len(equations):
             return _Meant(None, 1)
-        allowed = [known[1] for each in said if (known := allowed_elements(each))]
-        among = frozenset(range(found[0].occupancy.nothing)).intersection(*allowed)
+        among = frozenset(range(found[0].occupancy.nothing)).intersection(*(numbers for _, numbers in allowed))
         return _Meant(among, min(each.ranks for each in found), shared=bool(equations))
 
     def _looked_up(self, condition: Node, meant: _Meant | None) -> list[tuple[int, str]]:
