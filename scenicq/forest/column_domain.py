@@ -72,7 +72,7 @@ from scenicq.geometry.membership import contains_many, distance_many
 from scenicq.geometry.regions import SLACK, PolygonSet, Region
 from scenicq.geometry.terms import UndecidedError
 
-__all__ = ["ColumnDomain"]
+__all__ = ["ColumnDomain", "first_direction"]
 
 _NOTHING = Constant(None)
 _MEANT: Mapping[Kind, type] = {"scalar": np.ndarray, "boolean": np.ndarray, "vector": tuple}
@@ -370,15 +370,21 @@ def _of_boxes(box: Placed, region: Region, places: ColumnPlaces, mine: NDArray[n
     return covers_many(region, box_polygons(*numbers))
 
 
+def first_direction(_node: DirectionAt, _counts: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Picks the first heading that a vector field allows, where any of them will do."""
+    return np.zeros(1, np.intp)
+
+
 def _of_one_kind(options: Sequence[Column]) -> list[Data]:
     """The data of options; that of one which is nowhere defined is of the others' kind, as it does not matter."""
-    there = [option.data for option in options if bool((option.status == DEFINED).any())]
+    defined = [bool((option.status == DEFINED).any()) for option in options]
+    there = [option.data for option, is_there in zip(options, defined, strict=True) if is_there]
     nothing: Data = np.full(1, np.nan)
     if there and isinstance(there[0], Coded):
         nothing = Coded(np.zeros(1, np.intp), (None,))
     elif there and isinstance(there[0], tuple):
         nothing = (np.full(1, np.nan), np.full(1, np.nan))
-    return [option.data if bool((option.status == DEFINED).any()) else nothing for option in options]
+    return [option.data if is_there else nothing for option, is_there in zip(options, defined, strict=True)]
 
 
 def _numbers(column: Column) -> Array | None:

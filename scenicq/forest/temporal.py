@@ -221,3 +221,8 @@ class Dynamics:
         """Whether the program says when it ends."""
         steps = (step for monitor in self.monitors for step in monitor.steps)
         return bool(self.terminations) or any(isinstance(step, Terminate) for step in steps)
+
+    @property
+    def time_limit_s(self) -> float | None:
+        """After how many seconds `terminate after` ends a run at the latest; None where no time ends it."""
+        return min((each.after_s for each in self.terminations if each.after_s is not None), default=None)

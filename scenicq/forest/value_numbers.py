@@ -1,6 +1,6 @@
 """Value numbering: expressions get numbers, and equal numbers mean equal values.
 
-Of a condition and its negation one is the other's base, so that both have one number.
+A condition and its negation have one number: one of them is the base of the other.
 """
 
 from __future__ import annotations

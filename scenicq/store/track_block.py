@@ -53,7 +53,7 @@ class TrackReach:
 class TrackBlock:
     """Some whole recordings of one part; a context manager.
 
-    Of label objects only those whose tracks are asked about are members.
+    Label objects are members only where their tracks are asked about.
 
     Attributes:
         runs: The first and the last label of each recording, the last left out; labels are counted from that of
@@ -119,8 +119,9 @@ class TrackBlock:
         """
         first = int(starts[0])
         codes, names = self._objects.codes("track", np.arange(first, int(starts[-1])))
-        chosen = np.zeros(len(codes), np.bool_)
-        chosen[rows - first] = True
+        asked = np.zeros(len(codes), np.bool_)
+        asked[rows - first] = True
+        chosen = asked.copy()
         bounds = starts[np.array(self.runs).ravel()] - first
         cuts = np.searchsorted(rows - first, bounds).reshape(-1, 2)
         wanted = np.zeros(len(names) + 1, np.bool_)
@@ -134,8 +135,6 @@ class TrackBlock:
                 wanted[mine] = False
         found = np.flatnonzero(chosen)
         if reach is not None:
-            asked = np.zeros(len(codes), np.bool_)
-            asked[rows - first] = True
             label = np.searchsorted(starts - first, found, side="right") - 1
             track = self.recording_of[label] * (len(names) + 1) + codes[found]
             found = found[self._within_reach(track, label, asked[found], reach)]

@@ -620,8 +620,8 @@ class DynamicDefinition(SyntaxNode):
     Attributes:
         kind: Which.
         name: Its name.
-        parameters: Of a monitor.
-        body: Of a monitor.
+        parameters: What a monitor takes.
+        body: What a monitor does.
     """
 
     kind: str

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.forest.clear_columns import QuickColumns, quick_form
-from scenicq.forest.column_domain import ColumnDomain
+from scenicq.forest.column_domain import ColumnDomain, first_direction
 from scenicq.forest.columns import DEFINED, UNDEFINED, Coded, Column, column_of, constant_column, truth_of
 from scenicq.forest.columns import UNKNOWN as UNOBSERVED
 from scenicq.forest.condition import expand
@@ -222,7 +222,7 @@ class AtomColumns:
             return _as_truth(self._evaluate(condition, chosen, counts), len(self.samples))
         open_ = np.flatnonzero(found == UNKNOWN)
         if len(open_):
-            domain = ColumnDomain(lambda node: self._observed_at(node, open_), self._assigned, _any_direction)
+            domain = ColumnDomain(lambda node: self._observed_at(node, open_), self._assigned, first_direction)
             with np.errstate(all="ignore"):
                 found[open_] = _as_truth(interpret(steps_of(condition), domain)[id(condition)], len(open_))
         return found
@@ -238,7 +238,7 @@ class AtomColumns:
         quick = quick_form(condition, ego)
         if quick is None:
             return None
-        domain = QuickColumns(self._observed, self._assigned, _any_direction)
+        domain = QuickColumns(self._observed, self._assigned, first_direction)
         with np.errstate(all="ignore"):
             return _as_truth(interpret(steps_of(quick), domain)[id(quick)], len(samples))
 
@@ -332,10 +332,6 @@ def _as_truth(found: Column, count: int) -> Truth:
     held = np.where(truth_of(found.data), TRUE, FALSE)
     truth = np.where(found.status == DEFINED, held, np.where(found.status == UNDEFINED, FALSE, UNKNOWN))
     return np.broadcast_to(truth, count).copy()
-
-
-def _any_direction(_node: DirectionAt, _allowed: NDArray[np.intp]) -> NDArray[np.intp]:
-    return np.zeros(1, np.intp)
 
 
 def _as_at(samples: NDArray[np.int64], column: Column) -> Column:

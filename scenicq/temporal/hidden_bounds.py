@@ -89,7 +89,7 @@ def _ends(
     starts, last = stretches.starts, stretches.ends()
     if not machine.dynamics.terminates:
         return starts, last
-    due = times_out(stretches, np.inf if required.within_s is None else required.within_s)
+    due = times_out(stretches, required.within_s)
     first, latest = due, np.minimum(due, last)
     conditions = [each.condition for each in machine.dynamics.terminations if each.condition is not None]
     unclear = any(each.number in hidden.of for each in conditions) or len(required.ends) < len(conditions)

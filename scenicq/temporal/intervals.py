@@ -167,10 +167,10 @@ class IntervalMatcher:
         dynamics = self.scenario.dynamics
         if dynamics is None:
             return TrackReach(0.0, self.options.gap_s, gaps=True)
-        times = [each.after_s for each in dynamics.terminations if each.after_s is not None]
+        limit_s = dynamics.time_limit_s
         # of what does not change, one observation anywhere counts
         moving = all(name in MOVING for _, name in features(*dynamics.conditions))
-        return TrackReach(min(times), self.options.gap_s) if times and moving else None
+        return TrackReach(limit_s, self.options.gap_s) if limit_s is not None and moving else None
 
     def intervals(self, table: StartTable, remember: Callable[[int], Remembered], *, every: bool = True) -> Reported:
         """What became of each binding: the intervals to report, or else the one that came furthest.

@@ -59,6 +59,5 @@ class Required:
                     pass
         monitored = any(isinstance(step, Terminate) for each in dynamics.monitors for step in each.steps)
         ends = tuple(each.condition for each in dynamics.terminations if each.condition is not None)
-        times = [each.after_s for each in dynamics.terminations if each.after_s is not None]
         now, always, later = (tuple(when[at]) for at in ("now", "always", "later"))
-        return cls(now, always, later, () if monitored else ends, min(times, default=None))
+        return cls(now, always, later, () if monitored else ends, dynamics.time_limit_s)

@@ -108,11 +108,9 @@ class RunSteps:
         """Begin, and find the places at which the same is true of what hangs on no hidden number."""
         stretches, which = self.stretches, self.which
         self.starts, self.last = stretches.starts[which], stretches.ends()[which]
-        after_s = min(
-            (e.after_s for e in self.machine.dynamics.terminations if e.after_s is not None), default=math.inf
-        )
-        self.limited = math.isfinite(after_s)
-        self.due = times_out(stretches, after_s)[which]
+        limit_s = self.machine.dynamics.time_limit_s
+        self.limited = limit_s is not None and math.isfinite(limit_s)
+        self.due = times_out(stretches, limit_s)[which]
         self._of = {} if self.hidden is None else self.hidden.of
         known = [number for number in self.machine.atoms if number not in self._of]
         code = np.zeros(len(stretches.labels), np.int64)
@@ -346,10 +344,10 @@ def _at(sides: dict[int, NDArray[np.bool_]], which: NDArray[np.int64]) -> dict[i
     return {cut: each[which] for cut, each in sides.items()}
 
 
-def times_out(stretches: Stretches, after_s: float) -> Places:
-    """For each start the first place at which so many seconds are over, the end of its stretch if there is none."""
+def times_out(stretches: Stretches, after_s: float | None) -> Places:
+    """For each start the first place at which so many seconds are over, behind its stretch if there is none."""
     last = stretches.ends()
-    if not math.isfinite(after_s):
+    if after_s is None or not math.isfinite(after_s):
         return last + 1
     # whole numbers that grow from place to place, over all stretches
     time_us = np.round(stretches.seconds * 1e6).astype(np.int64)

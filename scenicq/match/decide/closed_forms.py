@@ -14,11 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.forest.clear_columns import ClearColumns
+from scenicq.forest.column_domain import first_direction
 from scenicq.forest.columns import DEFINED, Column, constant_column, truth_of
 from scenicq.forest.groups import PARAMS, Condition, Constraint, Group
 from scenicq.forest.interpret import Steps, interpret, steps_of
 from scenicq.forest.kinds import kind_of
-from scenicq.forest.nodes import Constant, DirectionAt, Feature, Identity, Index, Node, PointIn, Select, Value
+from scenicq.forest.nodes import Constant, Feature, Identity, Index, Node, PointIn, Select, Value
 from scenicq.forest.walk import children, leaves, postorder
 from scenicq.match.decide.closed_form import ClosedForm, Evaluated
 from scenicq.match.decide.closed_numbers import heading, number, text
@@ -94,10 +95,7 @@ def _of_columns(
     def observed(node: Feature) -> Column:
         return Column(cast("NDArray[np.float64]", get(node.object, node.property)), np.full(1, DEFINED))
 
-    def first(_: DirectionAt, allowed: NDArray[np.intp]) -> NDArray[np.intp]:
-        return np.zeros_like(allowed)
-
-    domain = ClearColumns(observed, lambda leaf, _: constant_column(chosen[leaf.identity]), first)
+    domain = ClearColumns(observed, lambda leaf, _: constant_column(chosen[leaf.identity]), first_direction)
     data, status = interpret(steps, domain, known)[id(root)]
     held, told = (np.broadcast_to(each, get.size) for each in (truth_of(data), np.equal(status, DEFINED)))
     return Evaluated((held & told).tolist(), (~held & told).tolist(), {})

@@ -96,19 +96,19 @@ class FailedBatch:
         numbers: Of each, who plays the objects of `FirstFit.order` in the correspondence that comes furthest.
         constraint: What fails of that.
         form: The closed form of the group of which it is one.
-        ranks: Where in that order each object is.
     """
 
     rows: Sequence[LabelRow]
     numbers: Sequence[tuple[int, ...]]
     constraint: Constraint
     form: ClosedForm
-    ranks: Mapping[int, int]
 
-    def outcomes(self, options: MatchOptions, lookups: MapLookups) -> Iterator[Outcome | None]:
-        """What is said of each label in words; None where it is not clear."""
+    def outcomes(
+        self, ranks: Mapping[int, int], options: MatchOptions, lookups: MapLookups
+    ) -> Iterator[Outcome | None]:
+        """What is said of each label in words, given `FirstFit.ranks`; None where it is not clear."""
         return (
-            self.form.decide(_getter(row, numbers, self.ranks), options, lookups)
+            self.form.decide(_getter(row, numbers, ranks), options, lookups)
             for row, numbers in zip(self.rows, self.numbers, strict=True)
         )
 
@@ -337,16 +337,16 @@ def _getter(row: LabelRow, numbers: tuple[int, ...], ranks: Mapping[int, int]) -
 
 def _blamed(form: ClosedForm, batch: _Batch, options: MatchOptions, lookups: MapLookups) -> Iterator[FailedBatch]:
     """Labels of which a group fails, by its first constraint that fails alone, or else by the first."""
-    left, ranks = batch, batch.fit.ranks
+    left = batch
     for part in form.parts:
         fails = _listed(left.evaluate(part, options, lookups).fails, len(left.rows))
         if any(fails):
             some = left.where(fails)
-            yield FailedBatch(some.rows, some.numbers, part.constraint, form, ranks)
+            yield FailedBatch(some.rows, some.numbers, part.constraint, form)
             if all(fails):
                 return
             left = left.where([not each for each in fails])
-    yield FailedBatch(left.rows, left.numbers, form.constraint, form, ranks)
+    yield FailedBatch(left.rows, left.numbers, form.constraint, form)
 
 
 def _column(

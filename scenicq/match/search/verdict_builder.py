@@ -78,7 +78,7 @@ class VerdictBuilder:
             yield row.number, Match(names, _witness(keys, values))
 
     def _failures(self, fit: FirstFit, batch: FailedBatch, lookups: MapLookups) -> Iterator[tuple[int, NoMatch]]:
-        outcomes = batch.outcomes(self.options, lookups)
+        outcomes = batch.outcomes(fit.ranks, self.options, lookups)
         for row, numbers, outcome in zip(batch.rows, batch.numbers, outcomes, strict=True):
             if isinstance(outcome, Refuted):
                 assignment = {index: numbers[rank] for index, rank in fit.ranks.items() if rank < len(numbers)}

@@ -14,9 +14,8 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from scenicq.forest.column_domain import ColumnDomain
+from scenicq.forest.column_domain import ColumnDomain, first_direction
 from scenicq.forest.columns import DEFINED, UNKNOWN, Column, truth_of
 from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.interpret import interpret, steps_of
@@ -38,7 +37,7 @@ from scenicq.geometry.occupancy import TOLERANCE, ElementAtPoint, Occupancy
 from scenicq.geometry.regions import Region
 from scenicq.limits import LIMITS
 from scenicq.match.tolerance import SLACK
-from scenicq.query.prefilter.regions import RegionNames, named, region_ids
+from scenicq.query.prefilter.regions import RegionNames, among_names, region_ids
 from scenicq.query.prefilter.sql_ends import number
 
 __all__ = ["LookUp", "MapRelations", "allowed_elements", "look_up_of", "shared_look_ups"]
@@ -136,11 +135,7 @@ def _absent(node: Node, *_: object) -> Column:
     raise CannotEvaluate(f"{type(node).__name__} is none of the element's")
 
 
-def _first(_: DirectionAt, counts: NDArray[np.intp]) -> NDArray[np.intp]:
-    return np.zeros_like(counts)
-
-
-_TABULATED = ColumnDomain(_absent, _absent, _first)
+_TABULATED = ColumnDomain(_absent, _absent, first_direction)
 """What conditions are for each element, where they hang on nothing else."""
 
 
@@ -183,7 +178,7 @@ class MapRelations:
             at = f"SELECT f, object, region, distance FROM {rows} WHERE {own} AND {_AT}"
             if table.first:
                 at = (
-                    f"SELECT f, object, region FROM ({at}) WHERE region IN {named(table.first, self.names)} "
+                    f"SELECT f, object, region FROM ({at}) WHERE region IN {among_names(table.first, self.names)} "
                     f"QUALIFY distance = 0 AND count(*) OVER (PARTITION BY f, object) <= {table.most}"
                 )
             relation = self.names.table("source, region", *([pair[side] for pair in table.pairs] for side in (0, 1)))
@@ -245,7 +240,7 @@ class MapRelations:
         if sources is None or found[0].occupancy.nothing in among:
             return None
         ids = sorted({each for layer in sources for each, place in layer if place in among})
-        return found[0].object, f"(region IN {named(ids, self.names)} AND {_AT})"
+        return found[0].object, f"(region IN {among_names(ids, self.names)} AND {_AT})"
 
     def surely_holds(self, look_up: LookUp, among: Collection[int], most: int) -> str | None:
         """A condition on frames: that one of some elements lies where the ego is, and may be the one that is meant."""

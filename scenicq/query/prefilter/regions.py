@@ -14,7 +14,7 @@ from scenicq.match.tolerance import SLACK
 from scenicq.query.prefilter.sql_ends import number
 from scenicq.store.sql import sql_text
 
-__all__ = ["RegionNames", "named", "near_region", "nearest_box", "region_ids"]
+__all__ = ["RegionNames", "among_names", "near_region", "nearest_box", "region_ids"]
 
 _WRITTEN_OUT = 8
 """Names that are written out."""
@@ -155,10 +155,10 @@ def _chosen(area: PolygonSet, names: RegionNames) -> str | None:
     if id(area) in names.kinds:
         return f"kind IN ({', '.join(map(sql_text, names.kinds[id(area)]))})"
     ids = _ids(area, names)
-    return None if ids is None else f"region IN {named(ids, names)}"
+    return None if ids is None else f"region IN {among_names(ids, names)}"
 
 
-def named(ids: Sequence[str], names: RegionNames) -> str:
+def among_names(ids: Sequence[str], names: RegionNames) -> str:
     """Some names as the right side of `IN`: a table is hashed, a list is gone through for every row."""
     if len(ids) <= _WRITTEN_OUT:
         return f"({', '.join(map(sql_text, ids)) or 'NULL'})"
