@@ -338,7 +338,6 @@ class Limits:
     heading_terms: int = _coarser(64, "terms", "of a heading that is a sum", "the sum is one term")
     sql_alternatives: int = _coarser(16, "alternatives", "of one value that are kept apart", "they are one interval")
     sql_characters: int = _coarser(6000, "characters", "of an end of an interval", "the interval has no end")
-    proof_alternatives: int = _otherwise(16, "alternatives", "of what columns prove", "the matcher decides the frames")
     counted_roles: int = _otherwise(6, "roles", "that SQL fills by counting", "the matcher decides the frames")
     tied_roles: int = _otherwise(
         3, "roles", "that SQL fills where conditions tie two of them together", "the matcher decides the frames"

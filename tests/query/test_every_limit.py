@@ -129,7 +129,6 @@ REACHED: dict[str, str] = {
     "heading_terms": "frames: figure 3",
     "sql_alternatives": "frames: figure 3",
     "sql_characters": "frames: figure 3",
-    "proof_alternatives": "ids: figure 3",
     "counted_roles": "ids: crowd",
     "tied_roles": "ids: row",
     "recording_starts": "time: 1",

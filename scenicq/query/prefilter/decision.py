@@ -7,27 +7,25 @@ by counting (Hall's theorem) where no condition ties two of them together, else 
 from __future__ import annotations
 
 import itertools
-import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from scenicq.limits import LIMITS
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import SLACK
-from scenicq.query.prefilter.conditions import EGO
-from scenicq.query.prefilter.sql_ends import number
-from scenicq.query.prefilter.sufficient import SufficientCondition
+from scenicq.query.prefilter.condition_reader import EGO, ColumnCondition
+from scenicq.query.prefilter.sql_ends import columns_of, number, renamed_tables
 
 if TYPE_CHECKING:
     import duckdb
 
-__all__ = ["columns_of", "decided_frames", "decision", "new_table"]
+__all__ = ["decided_frames", "decision", "new_table"]
 
 _DECIDED = "decided"
 
 
 def decision(
-    found: Sequence[SufficientCondition],
+    found: Sequence[ColumnCondition],
     roles: Sequence[int],
     flags: Mapping[str, str],
     options: MatchOptions,
@@ -52,17 +50,17 @@ def decision(
     ties = [each for each in found if len(each.objects) == 2]
     if len(roles) > (LIMITS.tied_roles if ties else LIMITS.counted_roles):
         return ()
-    if any(near not in flags or len(each.objects) == 2 for each in found for _, near in each.places):
+    placed = [each for each in found if each.region]
+    if any(each.region not in flags for each in placed):
         return ()
 
     def proved(objects_: tuple[int, ...]) -> list[str]:
-        mine = [each for each in found if each.objects == objects_]
-        placed = [("g" if index in roles else "e", near) for each in mine for index, near in each.places]
-        return [each.sql for each in mine if each.sql] + [f"{alias}.{flags[near]}" for alias, near in placed]
+        alias, mine = "g" if objects_ else "e", [each for each in found if each.objects == objects_]
+        return list(dict.fromkeys(f"{alias}.{flags[each.region]}" if each.region else f"({each.sql})" for each in mine))
 
     frames = " AND ".join([f"{EGO}.number IN {left}", *proved(())])
     # a table that nothing is asked of would be joined all the same
-    asked = {index in roles for each in found for index, _ in each.places}
+    asked = {bool(each.objects) for each in placed}
     ego_flags = f" LEFT JOIN flags e ON e.f = {EGO}.number AND e.object = 'ego'" if False in asked else ""
     if not roles:
         return (new_table(_DECIDED, f"SELECT {EGO}.number AS f FROM {labels} {EGO}{ego_flags} WHERE {frames}"),)
@@ -109,12 +107,6 @@ def new_table(name: str, query: str) -> str:
     return f"CREATE OR REPLACE TEMP TABLE {name} AS {query}"
 
 
-def columns_of(alias: str, texts: Iterable[str]) -> list[str]:
-    """The columns of a table that conditions use."""
-    pattern = re.compile(rf"\b{alias}\.(\w+)")
-    return sorted({name for text in texts for name in pattern.findall(text)})
-
-
 def _counted(roles: int) -> str:
     """The frames in which any number of roles have as many objects among them."""
     enough = [
@@ -125,7 +117,7 @@ def _counted(roles: int) -> str:
     return f"SELECT f FROM sure GROUP BY f HAVING {' AND '.join(enough)}"
 
 
-def _joined(roles: Sequence[int], ties: Sequence[SufficientCondition]) -> str:
+def _joined(roles: Sequence[int], ties: Sequence[ColumnCondition]) -> str:
     """The frames in which distinct objects have all roles, two by two tied together."""
     tables = ["sure p0"]
     for place in range(1, len(roles)):
@@ -134,7 +126,5 @@ def _joined(roles: Sequence[int], ties: Sequence[SufficientCondition]) -> str:
     holds = [f"p{place}.s{place}" for place in range(len(roles))]
     for each in ties:
         one, other = (f"p{roles.index(index)}" for index in each.objects)
-        text = re.sub(r"\ba\.", f"{one}.", each.sql)
-        text = re.sub(rf"\b{EGO}\.", f"{one}.", re.sub(r"\bb\.", f"{other}.", text))
-        holds.append(f"({text})")
+        holds.append(f"({renamed_tables(str(each.sql), {'a': one, 'b': other, EGO: one})})")
     return f"SELECT DISTINCT p0.f FROM {' '.join(tables)} WHERE {' AND '.join(holds)}"

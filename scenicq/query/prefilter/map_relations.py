@@ -40,7 +40,7 @@ from scenicq.match.tolerance import SLACK
 from scenicq.query.prefilter.regions import RegionNames, among_names, region_ids
 from scenicq.query.prefilter.sql_ends import number
 
-__all__ = ["LookUp", "MapRelations", "allowed_elements", "look_up_of", "shared_look_ups"]
+__all__ = ["LookUp", "MapRelations", "MeantElements", "allowed_elements", "look_up_of", "shared_look_ups"]
 
 _AT = f"distance <= {number(TOLERANCE + SLACK)}"
 """An element that may be found at a place."""
@@ -149,6 +149,21 @@ def shared_look_ups(node: Node) -> tuple[LookUp, LookUp] | None:
     return one, other
 
 
+@dataclass(frozen=True, slots=True)
+class MeantElements:
+    """Which elements may be meant where the ego is.
+
+    Attributes:
+        among: Their numbers; None where each condition has some of its own.
+        most: Any of so many elements at the place may be meant, surely; 0 for what is possible.
+        shared: Whether the same element is meant where another object is.
+    """
+
+    among: frozenset[int] | None
+    most: int = 0
+    shared: bool = False
+
+
 @dataclass(slots=True)
 class MapRelations:
     """The relations that a plan asks for: tables of frames and of regions that are meant there.
@@ -187,60 +202,50 @@ class MapRelations:
                 f"SELECT DISTINCT e.f, e.object, r.region FROM ({at}) e JOIN {relation} r ON r.source = e.region",
             )
 
-    def may_be_in(self, region: Select, reach: float, required: Sequence[Node]) -> str | None:
-        """A condition on memberships that an object meets which lies in a region that hangs on where the ego is.
+    def possible_elements(self, look_up: LookUp, required: Sequence[Node]) -> MeantElements:
+        """Which elements a look-up may mean where all of some conditions hold."""
+        return MeantElements(_among(look_up, required))
+
+    def in_region(self, region: Select, look_up: LookUp, meant: MeantElements, reach: float) -> str | None:
+        """A condition on memberships that an object meets which lies in a region that depends on where the ego is.
 
         Args:
             region: The region.
+            look_up: That where the ego is, on which the region depends.
+            meant: The elements that may be meant: the map may have no such region for others.
             reach: Metres that the object may be off; at most `MEMBERSHIP_RADIUS_M`.
-            required: All that is required: the map may have no such region for some elements.
 
         Returns:
             SQL over the columns of `memberships` and `q.f`; None if the region is not made of elements of the map.
         """
-        look_up, meant = self.of_ego(region.index), self._meant(region)
-        if look_up is None or meant is None:
+        regions = self._regions(region)
+        if regions is None:
             return None
-        among = _among(look_up, required)
-        meant = {place: ids for place, ids in meant.items() if place in among}
-        if look_up.occupancy.nothing in meant:
+        among = range(look_up.occupancy.nothing) if meant.among is None else meant.among
+        regions = {place: ids for place, ids in regions.items() if place in among}
+        if not meant.most and look_up.occupancy.nothing in regions:
             return None
-        return self._in_meant(self._table(look_up.occupancy, meant), reach)
-
-    def surely_in(self, region: Select, look_up: LookUp, reach: float, among: Collection[int], most: int) -> str | None:
-        """The same of an object that surely lies there, where the element that is meant is one of some.
-
-        Args:
-            region: The region.
-            look_up: That where the ego is, on which the region hangs.
-            reach: Metres that the object may be off.
-            among: The numbers of the elements.
-            most: Any of so many elements at the place may be meant.
-        """
-        meant = self._meant(region)
-        if meant is None:
+        table = self._table(look_up.occupancy, regions, meant.most)
+        if table is None:
             return None
-        some = {place: ids for place, ids in meant.items() if place in among}
-        return self._in_meant(self._table(look_up.occupancy, some, most), reach)
+        return f"((q.f, region) IN (SELECT f, region FROM {table}) AND distance <= {number(reach + SLACK)})"
 
-    def may_hold(self, root: Node, required: Sequence[Node]) -> tuple[int, str] | None:
+    def may_hold(self, look_up: LookUp, numbers: frozenset[int], required: Sequence[Node]) -> str | None:
         """A condition on memberships that a condition on what lies where an object is amounts to.
 
         Args:
-            root: The condition.
+            look_up: That where the object is.
+            numbers: Those of the elements for which the condition holds.
             required: All that is required, the condition among it.
 
         Returns:
-            The object, and SQL over the columns of its memberships; None where it is no such condition, or may hold
-            where nothing lies.
+            SQL over the columns of the object's memberships; None where the condition may hold where nothing lies.
         """
-        if (found := allowed_elements(root)) is None:
-            return None
-        sources, among = self._sources(found[0].occupancy), found[1] & _among(found[0], required)
-        if sources is None or found[0].occupancy.nothing in among:
+        sources, among = self._sources(look_up.occupancy), numbers & _among(look_up, required)
+        if sources is None or look_up.occupancy.nothing in among:
             return None
         ids = sorted({each for layer in sources for each, place in layer if place in among})
-        return found[0].object, f"(region IN {among_names(ids, self.names)} AND {_AT})"
+        return f"(region IN {among_names(ids, self.names)} AND {_AT})"
 
     def surely_holds(self, look_up: LookUp, among: Collection[int], most: int) -> str | None:
         """A condition on frames: that one of some elements lies where the ego is, and may be the one that is meant."""
@@ -299,7 +304,8 @@ class MapRelations:
         found = look_up_of(index)
         return found if found is not None and found.object == self.ego else None
 
-    def _meant(self, region: Select) -> dict[int, Sequence[str]] | None:
+    def _regions(self, region: Select) -> dict[int, Sequence[str]] | None:
+        """The regions of each element that a choice by its number has; None if some has no name."""
         meant: dict[int, Sequence[str]] = {}
         for place, option in enumerate(region.options):
             if not isinstance(option, Constant):
@@ -310,11 +316,6 @@ class MapRelations:
                     return None
                 meant[place] = ids
         return meant
-
-    def _in_meant(self, table: str | None, reach: float) -> str | None:
-        if table is None:
-            return None
-        return f"((q.f, region) IN (SELECT f, region FROM {table}) AND distance <= {number(reach + SLACK)})"
 
     def _sources(self, occupancy: Occupancy) -> list[list[tuple[str, int]]] | None:
         """For each layer the regions in which elements are found, with their numbers; None where some has no name."""

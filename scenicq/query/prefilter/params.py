@@ -6,22 +6,22 @@ from scenicq.forest.groups import PARAMS
 from scenicq.forest.nodes import Constant, Node, Select
 from scenicq.forest.scenario import Scenario
 from scenicq.match.options import MatchOptions
-from scenicq.query.prefilter.conditions import EGO, NecessaryCondition
+from scenicq.query.prefilter.condition_reader import EGO, ColumnCondition
 from scenicq.query.prefilter.sql_bounds import SqlBounds
-from scenicq.query.prefilter.sql_ends import any_of, between
+from scenicq.query.prefilter.sql_ends import SqlTruth, any_of, between
 from scenicq.store.sql import sql_text
 
 __all__ = ["param_conditions"]
 
 
-def param_conditions(scenario: Scenario, options: MatchOptions) -> list[NecessaryCondition]:
+def param_conditions(scenario: Scenario, options: MatchOptions) -> list[ColumnCondition]:
     """What the parameters that a program sets demand of those of a label, where it has them.
 
     Args:
         scenario: The scenario.
         options: Which parameters are ignored, and the tolerance of numbers.
     """
-    found: list[NecessaryCondition] = []
+    found: list[ColumnCondition] = []
     for name, given in scenario.params.items():
         if not given.explicit or name in options.ignore_params or not name.isidentifier():
             continue
@@ -29,7 +29,7 @@ def param_conditions(scenario: Scenario, options: MatchOptions) -> list[Necessar
         seen = f"json_extract_string({EGO}.params, {path})"
         texts = _texts(given.value)
         if texts is not None:
-            sql: str | bool = f"{seen} IN ({', '.join(map(sql_text, texts))})"
+            sql: SqlTruth = f"{seen} IN ({', '.join(map(sql_text, texts))})"
         else:
             value = f"TRY_CAST({seen} AS DOUBLE)"
             sql = any_of(
@@ -39,7 +39,7 @@ def param_conditions(scenario: Scenario, options: MatchOptions) -> list[Necessar
                 ]
             )
         if isinstance(sql, str):
-            found.append(NecessaryCondition(f"param {name}", (), sql, given.span))
+            found.append(ColumnCondition((), sql, what=f"param {name}", span=given.span))
     return found
 
 

@@ -17,14 +17,14 @@ from scenicq.limits import LIMITS
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.preprocess import ready
 from scenicq.match.tolerance import SLACK
-from scenicq.query.prefilter.conditions import EGO, NecessaryCondition, conditions
-from scenicq.query.prefilter.decision import columns_of, decision, new_table
+from scenicq.query.prefilter.condition_reader import EGO, ColumnCondition
+from scenicq.query.prefilter.conditions import necessary_conditions, sufficient_conditions
+from scenicq.query.prefilter.decision import decision, new_table
 from scenicq.query.prefilter.map_relations import MapRelations
 from scenicq.query.prefilter.params import param_conditions
 from scenicq.query.prefilter.plan_draft import Draft, Stage, Step, blamed_step
 from scenicq.query.prefilter.regions import RegionNames
-from scenicq.query.prefilter.sql_ends import number
-from scenicq.query.prefilter.sufficient import sufficient_conditions
+from scenicq.query.prefilter.sql_ends import SqlTruth, columns_of, number
 from scenicq.store.classes import ROOT, class_matches, subclasses
 from scenicq.store.sql import sql_text
 
@@ -93,8 +93,8 @@ class _Role:
 
     owner: ScenarioObject
     classes: str
-    plain: list[NecessaryCondition]
-    placed: list[NecessaryCondition]
+    plain: list[ColumnCondition]
+    placed: list[ColumnCondition]
     column: str
 
     @property
@@ -103,7 +103,7 @@ class _Role:
         return len(self.plain) + 1
 
 
-def _level(conditions_: Sequence[str], first: int = 0) -> str:
+def _level(conditions_: Sequence[SqlTruth], first: int = 0) -> str:
     """How many conditions hold before the first that does not."""
     if not conditions_:
         return f"{first}::UTINYINT"
@@ -137,7 +137,7 @@ def make_plan(
     """
     scenario, own_ego = ready(scenario), options.ego == "label"
     relations = MapRelations(RegionNames(network), scenario.ego)
-    found = list(conditions(scenario, network, options, relations)) if own_ego else []
+    found = list(necessary_conditions(scenario, network, options, relations)) if own_ego else []
     columns: dict[tuple[str, ...], str] = {}
     roles: list[_Role] = []
     for owner in scenario.objects:
@@ -145,7 +145,7 @@ def make_plan(
             mine = [each for each in found if each.objects == (owner.index,)]
             plain, placed = [each for each in mine if not each.region], [each for each in mine if each.region]
             classes = _any_of(_classes(owner.category, options))
-            key = (classes, *(each.sql or each.region for each in (*plain, *placed)))
+            key = (classes, *(each.region or str(each.sql) for each in (*plain, *placed)))
             roles.append(_Role(owner, classes, plain, placed, columns.setdefault(key, f"c{len(columns)}")))
     pairs = _pairs(found)
     draft, params = Draft(), list(param_conditions(scenario, options))
@@ -153,7 +153,7 @@ def make_plan(
     if roles:
         _objects(draft, roles, pairs, options, counting=counting)
     proofs = sufficient_conditions(scenario, network, options, relations) if deciding else None
-    wanted = list(dict.fromkeys(near for each in proofs or () for _, near in each.places))
+    wanted = list(dict.fromkeys(each.region for each in proofs or () if each.region))
     flags = {near: f"s{place}" for place, near in enumerate(wanted) if any(each.region for each in found)}
     placed_table = _regions(
         draft, [each for each in found if not each.objects and each.region], roles, flags, relations
@@ -179,8 +179,8 @@ def make_plan(
     )
 
 
-def _pairs(found: Sequence[NecessaryCondition]) -> dict[tuple[int, ...], list[NecessaryCondition]]:
-    pairs: dict[tuple[int, ...], list[NecessaryCondition]] = {}
+def _pairs(found: Sequence[ColumnCondition]) -> dict[tuple[int, ...], list[ColumnCondition]]:
+    pairs: dict[tuple[int, ...], list[ColumnCondition]] = {}
     for each in found:
         if len(each.objects) == 2:
             pairs.setdefault(each.objects, []).append(each)
@@ -189,10 +189,10 @@ def _pairs(found: Sequence[NecessaryCondition]) -> dict[tuple[int, ...], list[Ne
 
 def _frames(
     draft: Draft,
-    own: Sequence[NecessaryCondition],
-    params: Sequence[NecessaryCondition],
+    own: Sequence[ColumnCondition],
+    params: Sequence[ColumnCondition],
     roles: Sequence[_Role],
-    pairs: dict[tuple[int, ...], list[NecessaryCondition]],
+    pairs: dict[tuple[int, ...], list[ColumnCondition]],
 ) -> None:
     """What the columns of the frame decide."""
     used = [each.sql for role in roles for each in role.plain] + [each.sql for tied in pairs.values() for each in tied]
@@ -223,7 +223,7 @@ def _some_role(roles: Iterable[_Role]) -> str:
     return f"({' OR '.join(dict.fromkeys(met))})"
 
 
-def _possible(sql: str) -> str:
+def _possible(sql: SqlTruth) -> str:
     """That a condition holds where a label tells."""
     return f"coalesce({sql}, true)"
 
@@ -233,7 +233,7 @@ def _near(options: MatchOptions) -> str:
     return "true" if options.radius is None else f"a.ego_distance <= {number(options.radius + SLACK)}"
 
 
-def _players(roles: Sequence[_Role], own: Sequence[NecessaryCondition], options: MatchOptions) -> str:
+def _players(roles: Sequence[_Role], own: Sequence[ColumnCondition], options: MatchOptions) -> str:
     """All conditions in one query; see `Plan.players`."""
     may = [" AND ".join([role.classes, *(_possible(each.sql) for each in role.plain)]) for role in roles]
     columns = ", ".join(f"({each}) AS r{place}" for place, each in enumerate(may))
@@ -247,7 +247,7 @@ def _players(roles: Sequence[_Role], own: Sequence[NecessaryCondition], options:
 
 
 def _objects(
-    draft: Draft, roles: Sequence[_Role], pairs: dict[tuple[int, ...], list[NecessaryCondition]], options: MatchOptions,
+    draft: Draft, roles: Sequence[_Role], pairs: dict[tuple[int, ...], list[ColumnCondition]], options: MatchOptions,
     *, counting: bool,
 ) -> None:  # fmt: skip
     """One pass over the objects: how far each comes in each role; without counts only those that may play one."""
@@ -289,7 +289,7 @@ def _objects(
 
 
 def _regions(
-    draft: Draft, own: Sequence[NecessaryCondition], roles: Sequence[_Role], wanted: Mapping[str, str],
+    draft: Draft, own: Sequence[ColumnCondition], roles: Sequence[_Role], wanted: Mapping[str, str],
     relations: MapRelations,
 ) -> str:  # fmt: skip
     """What memberships of regions decide; returns the table of objects and how far they come.
@@ -360,7 +360,7 @@ def _regions(
 
 
 def _distinct(
-    draft: Draft, roles: Sequence[_Role], source: str, pairs: dict[tuple[int, ...], list[NecessaryCondition]]
+    draft: Draft, roles: Sequence[_Role], source: str, pairs: dict[tuple[int, ...], list[ColumnCondition]]
 ) -> None:
     """Who is left for each role, and whether there are enough of them for all."""
     tied = [each.sql for conditions_ in pairs.values() for each in conditions_]
@@ -382,7 +382,7 @@ def _distinct(
     draft.stage([table], blamed, tally)
 
 
-def _pair(draft: Draft, roles: Sequence[_Role], objects: tuple[int, ...], tied: Sequence[NecessaryCondition]) -> None:
+def _pair(draft: Draft, roles: Sequence[_Role], objects: tuple[int, ...], tied: Sequence[ColumnCondition]) -> None:
     """Two roles whose objects conditions tie together: whoever has no partner is out of the role."""
     one, other = (next(place for place, role in enumerate(roles) if role.owner.index == index) for index in objects)
     ego = f" JOIN stage0 {EGO} ON {EGO}.f = a.f" if columns_of(EGO, [each.sql for each in tied]) else ""

@@ -7,7 +7,8 @@ which the least and the greatest are endless.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TypeAlias
 
 from scenicq.forest.interval_ends import FLOATS, Ends
@@ -15,11 +16,15 @@ from scenicq.forest.interval_values import FloatOrArray, Interval
 from scenicq.geometry.angles import azimuth
 from scenicq.match.tolerance import SLACK
 
-__all__ = ["SQL", "Expr", "all_of", "any_of", "between", "less", "modulo_turn", "number"]
+__all__ = [
+    "SQL", "Expr", "SqlTruth", "all_of", "any_of", "between", "columns_of", "difference", "less", "number",
+    "renamed_tables", "within_turn",
+]  # fmt: skip
 
 Expr: TypeAlias = float | str
 """A number, or SQL of one."""
 SqlTruth: TypeAlias = str | bool
+"""SQL of a condition, or whether it always holds."""
 
 
 def number(value: Expr) -> str:
@@ -153,9 +158,9 @@ def _extreme(values: Sequence[Expr], best: float, name: str) -> Expr:
     return f"(CASE WHEN ({' + '.join(texts)}) IS NOT NULL THEN {name}({', '.join(map(number, parts))}) END)"
 
 
-def modulo_turn(text: str) -> str:
-    """An angle taken modulo a full turn, in [0, 2 pi)."""
-    return f"({text} - 2 * pi() * floor(({text}) / (2 * pi())))"
+def difference(a: Expr, b: Expr) -> Expr:
+    """A number less another."""
+    return SQL.plus(a, SQL.negative(b))
 
 
 def less(a: Expr, b: Expr) -> SqlTruth:
@@ -182,3 +187,53 @@ def any_of(parts: Sequence[FloatOrArray]) -> SqlTruth:
         return True
     texts = list(dict.fromkeys(part for part in parts if isinstance(part, str)))
     return f"({' OR '.join(texts)})" if len(texts) > 1 else texts[0] if texts else False
+
+
+def within_turn(own: str, alternatives: Sequence[Interval[Expr]], width: float, directions: str = "") -> SqlTruth:
+    """Whether an angle lies in one of some intervals, or within a width of it, modulo a full turn; with slack.
+
+    Args:
+        own: The angle.
+        alternatives: The intervals.
+        width: In radians.
+        directions: A list of angles, one of which is added to the intervals.
+    """
+    width += SLACK
+    spans: list[tuple[Expr, Expr]] = []
+    for low, high, _ in alternatives:
+        span = difference(high, low)
+        if (isinstance(span, float) and span + 2 * width >= math.tau) or math.inf in (high, span):
+            return True
+        spans.append((SQL.plus(low, -width), SQL.plus(span, 2 * width)))
+
+    def holds(turned: str) -> SqlTruth:
+        # from where each span starts
+        angles = [(number(difference(turned, start)), span) for start, span in spans]
+        return any_of([SQL.at_most(f"({a} - 2 * pi() * floor(({a}) / (2 * pi())))", span) for a, span in angles])
+
+    if not directions:
+        return holds(own)
+    one, each = holds(f"{own} - {directions}[1]"), holds(f"{own} - d")
+    if not isinstance(each, str):
+        return each
+    # most places have one direction, for which arithmetic takes a fraction of what a function of lists does
+    return f"CASE WHEN len({directions}) = 1 THEN {one} ELSE len(list_filter({directions}, lambda d: {each})) > 0 END"
+
+
+_COLUMN = re.compile(r"'(?:[^']|'')*'|\b([a-z]\w*)\.(\w+)")
+"""A text, which is passed over, or a column of a table."""
+
+
+def columns_of(alias: str, conditions: Iterable[SqlTruth]) -> list[str]:
+    """The columns of a table that conditions use."""
+    found = (part for each in conditions if isinstance(each, str) for part in _COLUMN.finditer(each))
+    return sorted({part[2] for part in found if part[1] == alias})
+
+
+def renamed_tables(condition: str, aliases: Mapping[str, str]) -> str:
+    """A condition over other tables, by the aliases that it has."""
+
+    def replaced(part: re.Match[str]) -> str:
+        return f"{aliases[part[1]]}.{part[2]}" if part[1] in aliases else part[0]
+
+    return _COLUMN.sub(replaced, condition)

@@ -14,7 +14,7 @@ import pytest
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import ScenarioError, Source
 from scenicq.forest.evaluate import evaluate
-from scenicq.forest.nodes import Constant, Index, PointIn, Select
+from scenicq.forest.nodes import Constant, Index, Node, PointIn, Select
 from scenicq.forest.walk import leaves
 from scenicq.geometry.regions import PolygonSet
 from scenicq.match.matcher import Matcher
@@ -157,17 +157,23 @@ def test_something_may_be_meant_where_nothing_lies():
     assert isinstance(node, PointIn)
     assert isinstance(node.region, Select)
     relations = MapRelations(RegionNames(STREET), 0)
-    assert relations.may_be_in(node.region, 0.25, ()) is not None
+
+    def condition(region: Select, *required: Node) -> str | None:
+        look_up = relations.of_ego(region.index)
+        assert look_up is not None
+        return relations.in_region(region, look_up, relations.possible_elements(look_up, required), 0.25)
+
+    assert condition(node.region) is not None
     somewhere = next(each for each in node.region.options if isinstance(each.value, PolygonSet))
     options = [each if isinstance(each.value, PolygonSet) else somewhere for each in node.region.options]
     region = replace(node.region, options=tuple(options))
-    assert relations.may_be_in(region, 0.25, ()) is None
+    assert condition(region) is None
     # what is required of the element that is meant excludes it, of another one at the place it does not
     there = (*tuple(Constant(each is not options[-1]) for each in options[:-1]), Constant(False))
-    assert relations.may_be_in(region, 0.25, (Select(region.index, there),)) is not None
+    assert condition(region, Select(region.index, there)) is not None
     assert isinstance(region.index, Select)
     another = Select(replace(region.index, index=Index((1.0,) * len(region.index.options))), there)
-    assert relations.may_be_in(region, 0.25, (another,)) is None
+    assert condition(region, another) is None
 
 
 @pytest.mark.parametrize("kind", ["lane", "laneGroup", "road", "intersection", "crossing", "laneSection"])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import random
 import sys
 from pathlib import Path
 
@@ -18,9 +19,25 @@ from expressions import expressions
 from test_intervals import observing
 
 from scenicq.forest import build
+from scenicq.forest.draws import draw_leaf
 from scenicq.forest.evaluate import evaluate
 from scenicq.forest.interval_ends import FLOATS
-from scenicq.forest.nodes import Bearing, Compare, CompareOp, DiscreteRange, Feature, Logic, LogicOp, Norm, Undefined
+from scenicq.forest.nodes import (
+    ArithmeticOp,
+    Bearing,
+    Compare,
+    CompareOp,
+    DiscreteRange,
+    Feature,
+    Index,
+    Logic,
+    LogicOp,
+    Node,
+    Norm,
+    Range,
+    Select,
+    Undefined,
+)
 from scenicq.query.prefilter.sql_bounds import SqlBounds
 from scenicq.query.prefilter.sql_ends import SQL, number
 
@@ -86,6 +103,53 @@ def test_what_a_row_lacks_is_null_and_options_are_alternatives():
     rows = asked({"speed": [2.0, None]}, [number(each.low) for each in found])
     assert rows == [(3.0, 4.0, 5.0), (None, None, None)]
     assert bounds.intervals(Feature(0, "width", "scalar")) == ((-math.inf, math.inf, False),)
+
+
+DRAWS, BINS = 500, 3
+
+
+@given(st.data())
+@settings(max_examples=150, deadline=None, derandomize=True)
+def test_what_is_attained_is_drawn_in_every_part_of_the_alternatives(data):
+    """Sums, choices and products whose random variables may be shared, which attain less than their bounds then."""
+    numbers = [build.constant(float(data.draw(st.integers(-4, 4)))) for _ in range(2)]
+    made: list[Node] = [Range(*numbers), Range(build.constant(-1.0), build.constant(3.0)), *numbers]
+    made += [DiscreteRange(build.constant(-1.0), build.constant(1.0)), Feature(0, "speed", "scalar")]
+    index = Index((1.0, 2.0))
+    operations = (ArithmeticOp.ADD, ArithmeticOp.SUB, ArithmeticOp.MUL, ArithmeticOp.DIV, ArithmeticOp.ABS)
+    for _ in range(data.draw(st.integers(1, 5))):
+        one, other = data.draw(st.sampled_from(made)), data.draw(st.sampled_from(made))
+        kind = data.draw(st.integers(0, 6))
+        if kind < 5:
+            args = (one,) if operations[kind] is ArithmeticOp.ABS else (one, other)
+            made.append(build.arithmetic(operations[kind], *args))
+        else:
+            made.append(Select(index if kind == 5 else Index((1.0, 1.0)), (one, other)))
+    root, rng = made[-1], random.Random(data.draw(st.integers(0, 99)))
+    found = SqlBounds({(0, "speed"): number(2.5)}).intervals(root, attained=True)
+    if not found:
+        return
+    ends = asked({"one": [1.0]}, [number(end) for each in found for end in each[:2]])[0]
+    drawn = sorted(
+        value
+        for _ in range(DRAWS)
+        if isinstance(
+            value := evaluate(root, lambda leaf, args: draw_leaf(leaf, args, rng), {(0, "speed"): 2.5}), float
+        )
+    )
+    for low, high in zip(ends[::2], ends[1::2], strict=True):
+        width = (high - low) / BINS
+        for part in range(BINS):
+            assert any(low + part * width - 1e-9 <= value <= low + (part + 1) * width + 1e-9 for value in drawn)
+
+
+def test_what_is_chosen_by_one_number_twice_is_not_all_attained():
+    index, x = Index((1.0, 1.0)), Range(build.constant(0.0), build.constant(1.0))
+    inner = Select(index, (x, build.constant(9.0)))
+    bounds = SqlBounds({})
+    assert bounds.intervals(Select(Index((1.0, 1.0)), (inner, x)), attained=True)
+    assert not bounds.intervals(Select(index, (inner, x)), attained=True)
+    assert not bounds.intervals(build.add(x, x), attained=True)
 
 
 def test_conditions_that_are_gone_leave_no_bounds_behind():
