@@ -17,7 +17,7 @@ from scenicq.forest.show import show_forest
 from scenicq.geometry.default_street import street
 from scenicq.geometry.network import Network
 from scenicq.lint.impossible import impossible_requirements
-from scenicq.lint.program import lint
+from scenicq.lint.program import LINTED_MAPS, lint
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.constraints import build_groups, describe_constraint
 from scenicq.match.problem.preprocess import ready
@@ -32,7 +32,6 @@ from .datasets import open_checked
 from .main import ERROR
 from .manual import Manual
 from .programs import PROGRAM_TEXT, SCENARIO, given_program
-from .remarks import LINTED_MAPS
 from .report import as_json, count, show
 from .streams import say
 

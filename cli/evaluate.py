@@ -19,11 +19,13 @@ from scenicq.evaluate.evaluation import Evaluation
 from scenicq.evaluate.evaluation import evaluate as judge
 from scenicq.evaluate.pages import write_pages
 from scenicq.evaluate.rows import COLUMNS, evaluation_record, flat_rows, overview, tables
+from scenicq.option_values import SCORE, SEED
 from scenicq.report.write import check_target
 
 from .datasets import open_checked
 from .formats import CsvRows
 from .manual import Manual
+from .option_type import OptionType
 from .output import choose_format, destination, writing
 from .report import columns, plain, show
 from .sources import SENSORS, sensor_root
@@ -57,15 +59,15 @@ _EXTENSIONS = {".json": "json"}
               help="Detections of a model: nuScenes results (.json), Argoverse 2 (.feather), or labels of the "
               "interchange format whose objects have a `score` (.jsonl or .parquet).")
 @click.option("--distance", metavar="M", type=click.Choice(["0.5", "1", "2", "4"]), default="2",
-              help="Centre distance within which an object counts as found.")
-@click.option("--min-score", "least_score", metavar="S", type=float,
+              help="Centre distance within which an object counts as found: 0.5, 1, 2 or 4 metres.")
+@click.option("--min-score", "least_score", metavar="S", type=OptionType(SCORE),
               help="Score from which a detection counts, but for average precision; all by default.")
 @click.option("--missing", type=click.Choice(["error", "empty", "skip"]), default="error",
               help="What a frame without detections is: an error, a frame in which nothing was found, or left out.")
 @click.option("--simulated", metavar="FILE", type=click.Path(path_type=Path),
               help="Simulated runs to set beside it: CSV with `scenario` (the name of a results file) and `failed` or "
               "`score` (the share missed, 0 to 1).")
-@click.option("--seed", metavar="N", type=click.IntRange(0), default=0, help="Seed of the resamples.")
+@click.option("--seed", metavar="N", type=OptionType(SEED), default=0, help="Seed of the resamples.")
 @click.option("--format", "format_", metavar="NAME", type=click.Choice(_FORMATS),
               help="table, json, csv, spreadsheet (csv without formulas) or parquet.  [default: by the extension of "
               "FILE, else table]")

@@ -9,10 +9,12 @@ import click
 
 from scenicq.importers.ingest import IngestSummary
 from scenicq.importers.ingest import ingest as make_dataset
+from scenicq.option_values import Count
 from scenicq.store.manifest import LeftOut
 
 from .cache import user_cache
 from .manual import Manual
+from .option_type import OptionType
 from .output import ProgressBar
 from .report import columns, count, show_few
 from .sources import remember
@@ -78,7 +80,7 @@ def _lines(summary: IngestSummary, elapsed_s: float) -> list[str]:
 @click.option(
     "--jobs",
     metavar="N",
-    type=click.IntRange(1),
+    type=OptionType(Count(most=4096)),
     help="Processes that read and compute.  [default: one a processor, at most 8]",
 )
 @click.option("--force", is_flag=True, help="Replace a dataset that is there already.")

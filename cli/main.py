@@ -208,7 +208,6 @@ def _written() -> str:
 @click.command(
     cls=Commands,
     context_settings={
-        "auto_envvar_prefix": "SCENICQ",
         "help_option_names": ["-h", "--help"],
         "max_content_width": 100,
         "show_default": True,

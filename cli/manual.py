@@ -9,7 +9,7 @@ import click
 
 from .streams import only_results
 
-__all__ = ["Manual", "write_examples", "write_exit_codes"]
+__all__ = ["Manual", "variable_of", "write_examples", "write_exit_codes"]
 
 _ALWAYS = {2: "an error, which standard error explains", 130: "interrupted; nothing is left half-written"}
 _AS_IT_IS = "\b\n"
@@ -38,6 +38,12 @@ def write_examples(formatter: click.HelpFormatter, epilog: str | None) -> None:
         formatter.write(f"\n{epilog.removeprefix(_AS_IT_IS)}\n")
 
 
+def variable_of(command: click.Command, option: click.Option) -> str:
+    """The environment variable that stands for an option, such as `SCENICQ_MATCH_MIN_DURATION`."""
+    name = next((each.removeprefix("--") for each in option.opts if each.startswith("--")), option.name or "")
+    return f"SCENICQ_{command.name}_{name}".replace("-", "_").upper()
+
+
 class Manual(click.Command):
     """A command whose help reads like a page of a manual."""
 
@@ -62,6 +68,15 @@ class Manual(click.Command):
         self.arguments = arguments
         self.exits = exits or _DONE
         self.topics = topics or {}
+
+    def make_context(
+        self, info_name: str | None, args: list[str], parent: click.Context | None = None, **extra: Any
+    ) -> click.Context:
+        """Read the words and the environment, whose variables have the names that people write after `--`."""
+        for parameter in self.params:
+            if isinstance(parameter, click.Option):
+                parameter.envvar = variable_of(self, parameter)
+        return super().make_context(info_name, args, parent, **extra)
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command; standard output is for its results alone."""

@@ -17,6 +17,7 @@ import click
 from scenicq.errors import Diagnostic
 from scenicq.exporters.forms import FORMS
 from scenicq.match.verdict import Match
+from scenicq.option_values import Amount, Count
 from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query
 from scenicq.query.execution.shards import Engine, in_order, kept, run_here, shards_of
@@ -32,7 +33,8 @@ from .formats import FORMATS, SPREADSHEET_HELP
 from .funnel import show_funnel
 from .main import INTERRUPTS, NOTHING
 from .manual import Manual
-from .options import DEFAULTS, TOPICS, query_options
+from .option_type import OptionType
+from .options import DEFAULTS, TOPICS, option_type, query_options
 from .output import ProgressBar, choose_format
 from .pieces import Shard, parse_shard, run_shard
 from .plan import show_plan
@@ -81,39 +83,40 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
               help="How far labels may be off, in metres, deg or rad: position=, heading=, speed= and so on; "
               "for some objects ego.heading=15deg, Pedestrian.position=0.5; a bare size for all; or `exact`, 1e-3.  "
               "[default: position=0.25,heading=5deg]")
-@click.option("--classes", type=click.Choice(["fine", "coarse"]), default="fine",
+@click.option("--classes", type=option_type("classes"), default="fine",
               help="coarse folds all vehicles into Car and all people into Pedestrian.")
-@click.option("--ego", type=click.Choice(["label", "any"]), default="label",
+@click.option("--ego", type=option_type("ego"), default="label",
               help="Whether the scenario's ego is the recording vehicle, or any object of its class.")
-@click.option("--radius", metavar="M", type=click.FloatRange(0, min_open=True),
+@click.option("--radius", metavar="M", type=option_type("radius"),
               help="Ignore objects and map farther than this from the ego, in metres.")
 @click.option("--enforce", metavar="LIST", help="Built-in requirements to enforce besides visibility: containment, "
               "collision; `none` switches visibility off.")
 @click.option("--exact", is_flag=True, help="Every object of the frame must have a role.")
 @click.option("--solver", metavar="NAME", default="auto",
               help="auto, dreal, portable, or a command that reads SMT-LIB 2, such as 'z3 -in'.")
-@click.option("--method", type=click.Choice(["auto", "smt", "monolithic"]), default="auto",
+@click.option("--method", type=option_type("method"), default="auto",
               help="smt sends everything to the solver; monolithic as one formula. The verdicts are the same.")
 @click.option("--prefilter/--no-prefilter", default=True,
               help="Whether SQL narrows the frames first. The matches are the same.")
-@click.option("--jobs", metavar="N", type=click.IntRange(1), help="Processes that match.  [default: one a processor, "
+@click.option("--jobs", metavar="N", type=option_type("jobs"), help="Processes that match.  [default: one a processor, "
               "at most 8, once it is clear that it takes long; with --shard 1]")
-@click.option("--timeout", metavar="S", type=click.FloatRange(0, min_open=True), default=DEFAULTS.timeout_s,
+@click.option("--timeout", metavar="S", type=option_type("timeout"), default=DEFAULTS.timeout_s,
               help="Seconds for one frame, the solver's included; then it is unknown.")
-@click.option("--budget", metavar="N", type=click.IntRange(1), default=DEFAULTS.budget,
+@click.option("--budget", metavar="N", type=option_type("budget"), default=DEFAULTS.budget,
               help="Steps of the search for a correspondence in one frame; then the frame is unknown.")
-@click.option("--limit", metavar="N", type=click.IntRange(1), help="Stop after so many matches.")
-@click.option("--deadline", metavar="S", type=click.FloatRange(0, min_open=True), help="Stop after S seconds: what is "
+@click.option("--limit", metavar="N", type=option_type("limit"), help="Stop after so many matches.")
+@click.option("--deadline", metavar="S", type=OptionType(Amount("s", above=True)),
+              help="Stop after S seconds, or 5min, 2h: what is "
               "decided by then is written, the rest is counted, and `--resume` goes on.")
 @click.option("--all", "every", is_flag=True, help="Show frames that do not match, too, each with its cause.")
 @click.option("--all-matches", is_flag=True, help="One line for each correspondence by which a frame matches, "
               "interchangeable objects in one order only.")
-@click.option("--near", metavar="K", type=click.IntRange(1), help="Show the K frames, too, that do not match but come "
-              "closest, each with the tolerance under which it would; over time K recordings, each with the tolerance, "
-              "the number of the program or the duration with which it would.")
+@click.option("--near", metavar="K", type=OptionType(Count()), help="Show the K frames, too, that do not match but "
+              "come closest, each with the tolerance under which it would; over time K recordings, each with the "
+              "tolerance, the number of the program or the duration with which it would.")
 @click.option("--rank", is_flag=True, help="Order matches from typical to borderline: by the density with which the "
               "program generates what the label observes.")
-@click.option("--sample", metavar="N", type=click.IntRange(1), help="Show N of the matches, drawn at random.")
+@click.option("--sample", metavar="N", type=OptionType(Count()), help="Show N of the matches, drawn at random.")
 @click.option("--diverse", is_flag=True, help="With --sample: matches that spread over recordings and over the "
               "program's random variables.")
 @click.option("--advise", "advised", is_flag=True, help="Say which condition excludes most, and how many frames each "
@@ -136,15 +139,15 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @click.option("--report", metavar="DIR", type=click.Path(path_type=Path),
               help="Write a page with pictures of the matches, too: DIR/index.html.")
 @SENSORS
-@click.option("--scenic", type=click.Choice(["1", "2", "3"]), help="Version of Scenic.  [default: inferred]")
+@click.option("--scenic", type=option_type("scenic"), help="Version of Scenic.  [default: inferred]")
 @click.option("--initial", is_flag=True, help="Ignore behaviors and other dynamic parts: match the initial scene.")
 @click.option("--behaviors", type=click.Choice(["ignore"]), help="ignore leaves behaviors out and matches the rest of "
               "a dynamic program over time.")
-@click.option("--min-duration", metavar="S", type=click.FloatRange(0), help="Find intervals of at least S seconds: of "
-              "a program about one instant, those in which every frame matches with the same objects.")
-@click.option("--intervals", type=click.Choice(["longest", "all"]), default="longest",
+@click.option("--min-duration", metavar="S", type=option_type("min_duration"), help="Find intervals of at least S "
+              "seconds: of a program about one instant, those in which every frame matches with the same objects.")
+@click.option("--intervals", type=option_type("intervals"), default="longest",
               help="Report the longest of overlapping intervals, or all of them.")
-@click.option("--gap", metavar="S", type=click.FloatRange(0, min_open=True), default=DEFAULT_GAP_S,
+@click.option("--gap", metavar="S", type=option_type("gap"), default=DEFAULT_GAP_S,
               help="An object that has no label for longer than this is another one afterwards.")
 @click.option("--ignore-params", metavar="LIST", help="Global parameters that are not compared.")
 @click.option("--strict", is_flag=True, help="What the program sets and no label has is an error, not a warning; so is "

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-import shlex
-import shutil
 from typing import Any
 
-from scenicq.errors import Diagnostic, SolverError
+import click
+
 from scenicq.match.options import MatchOptions
-from scenicq.query.execution.option_texts import OptionTexts, read_options
+from scenicq.option_values import Choice
+from scenicq.query.execution.option_texts import KINDS, OptionTexts, read_options
 from scenicq.query.execution.run import QueryOptions
 from scenicq.temporal.interval_options import DEFAULT_GAP_S
 
-__all__ = ["DEFAULTS", "ONE_FRAME", "SHARED", "TOPICS", "query_options"]
+from .option_type import OptionType
+
+__all__ = ["DEFAULTS", "ONE_FRAME", "SHARED", "TOPICS", "option_type", "query_options"]
 
 DEFAULTS = MatchOptions()
 """What counts as a match unless options say otherwise."""
-_SOLVERS = ("auto", "dreal", "portable")
 SHARED = frozenset({
     "tolerance", "classes", "ego", "radius", "enforce", "exact", "solver", "method", "timeout", "budget", "scenic",
     "initial", "behaviors", "ignore_params", "strict",
@@ -41,18 +42,12 @@ ONE_FRAME = {
 """The rest of the options of a query about one frame."""
 
 
-def _check_solver(name: str) -> None:
-    """Refuse a name that nothing answers to at once, rather than at the first frame that needs the solver."""
-    try:
-        words = shlex.split(name)
-    except ValueError:
-        words = []
-    if name not in _SOLVERS and (not words or shutil.which(words[0]) is None):
-        hint = f"known are {', '.join(_SOLVERS)}, or a command that reads SMT-LIB 2, such as 'z3 -in'"
-        raise SolverError(Diagnostic("solver-missing", f"`{name}` is no solver, and no command here", hints=(hint,)))
+def option_type(name: str) -> click.ParamType[Any, Any]:
+    """The values of an option of a query, by its name."""
+    kind = KINDS[name]
+    return click.Choice(kind.texts) if isinstance(kind, Choice) else OptionType(kind)
 
 
 def query_options(given: dict[str, Any]) -> QueryOptions:
     """The options of a query from those of the command line."""
-    _check_solver(given["solver"])
     return read_options(**{name: given[name] for name in OptionTexts.__annotations__ if name in given})

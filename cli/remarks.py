@@ -4,20 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from itertools import islice
 
 import click
 
 from scenicq.errors import Diagnostic, ScenarioError
-from scenicq.lint.program import lint
+from scenicq.lint.program import lint_query
 from scenicq.query.execution.run import Query
 
 from .report import count, plain, show
 
-__all__ = ["LINTED_MAPS", "remarks", "show_remarks"]
+__all__ = ["remarks", "show_remarks"]
 
-LINTED_MAPS = 8
-"""Maps on which requirements are looked at."""
 _LINES = 5
 
 
@@ -32,8 +29,7 @@ def remarks(query: Query, maps: Sequence[str] | None = None) -> tuple[list[Diagn
         ScenarioError: The program is wrong, or the options are strict and there is anything to be said.
     """
     unseen = [*(query.misfits() if maps is None else ()), *query.coverage(maps).warnings]
-    compiled = ((each.scenario, each.network) for each in islice(query.fitting(maps), LINTED_MAPS))
-    found = lint(query.source, compiled, query.options.match, properties=False)
+    found = lint_query(query, maps)
     if query.options.strict and found:
         raise ScenarioError([replace(each, severity="error") for each in found])
     return unseen, found

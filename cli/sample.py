@@ -9,11 +9,14 @@ import click
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import plain_json
 from scenicq.exporters.sample import PATIENCE_S, sample_labels, sample_record, write_sample
+from scenicq.option_values import SEED, Count
 from scenicq.query.execution.option_texts import read_built_ins
 from scenicq.query.execution.program_files import SiblingFiles
 
 from .check import networks_of, read_version
 from .manual import Manual
+from .option_type import OptionType
+from .options import option_type
 from .programs import PROGRAM_TEXT, SCENARIO, given_program
 from .streams import say
 
@@ -34,8 +37,8 @@ __all__ = ["sample"]
 @click.argument("dataset", metavar="[DATASET]", type=click.Path(), required=False)
 @PROGRAM_TEXT
 @click.option("--map", "map_file", metavar="FILE", type=click.Path(path_type=Path), help="A GeoJSON or OpenDRIVE map.")
-@click.option("-n", "--number", metavar="N", type=click.IntRange(1), default=1, help="Scenes to draw.")
-@click.option("--seed", metavar="N", type=int, default=0, help="The same seed gives the same scenes.")
+@click.option("-n", "--number", metavar="N", type=OptionType(Count()), default=1, help="Scenes to draw.")
+@click.option("--seed", metavar="N", type=OptionType(SEED), default=0, help="The same seed gives the same scenes.")
 @click.option(
     "--waive",
     metavar="LIST",
@@ -45,11 +48,11 @@ __all__ = ["sample"]
 @click.option(
     "--timeout",
     metavar="S",
-    type=click.FloatRange(0, min_open=True),
+    type=option_type("timeout"),
     default=PATIENCE_S,
     help="Seconds of the processor for one scene.",
 )
-@click.option("--scenic", type=click.Choice(["1", "2", "3"]), help="Version of Scenic.  [default: inferred]")
+@click.option("--scenic", type=option_type("scenic"), help="Version of Scenic.  [default: inferred]")
 @click.option("--initial", is_flag=True, help="Ignore behaviors and other dynamic parts.")
 @click.option("-o", "--output", metavar="DIR", type=click.Path(path_type=Path),
               help="Write an interchange folder with labels and map, to be ingested.")  # fmt: skip

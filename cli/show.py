@@ -10,6 +10,7 @@ import click
 from scenicq.errors import DataError, Diagnostic
 from scenicq.match.matcher import Matcher
 from scenicq.match.verdict import Unknown
+from scenicq.option_values import HALF, WIDTH
 from scenicq.query.execution.lazy_solver import LazySolver
 from scenicq.query.execution.run import Query
 from scenicq.query.explain.frame_explanation import explain
@@ -24,6 +25,7 @@ from scenicq.store.labels import Label
 from .datasets import open_checked
 from .manual import Manual
 from .match import match
+from .option_type import OptionType
 from .options import ONE_FRAME, SHARED, query_options
 from .output import destination, writing
 from .programs import read_scenario
@@ -92,10 +94,10 @@ def _shot(dataset: Dataset, label: Label, scenario: Path | None, given: dict[str
 @click.option(
     "--half",
     metavar="M",
-    type=click.FloatRange(1, 1000),
+    type=OptionType(HALF),
     help="Metres from the ego to the edges of the picture.  [default: so that every role is seen]",
 )
-@click.option("--width", metavar="PX", type=click.IntRange(50, 10_000), default=900, help="Width in pixels.")
+@click.option("--width", metavar="PX", type=OptionType(WIDTH), default=900, help="Width in pixels.")
 @SENSORS
 def show(dataset: str, frame: str, *, scenario: Path | None, output: Path | None, half: float | None,
          width: int, sensors: Path | None, **given: Any) -> None:  # fmt: skip

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from itertools import islice
 
 from scenicq.errors import Diagnostic, Source
 from scenicq.forest.scenario import Scenario
@@ -15,9 +16,13 @@ from scenicq.geometry.network import Network
 from scenicq.lint.conditions import lint_scenario
 from scenicq.lint.text import lint_text
 from scenicq.match.options import MatchOptions
+from scenicq.query.execution.run import Query
 from scenicq.syntax.parser import parse
 
-__all__ = ["lint"]
+__all__ = ["LINTED_MAPS", "lint", "lint_query"]
+
+LINTED_MAPS = 8
+"""Maps on which requirements are looked at."""
 
 _SILENCED = re.compile(r"#\s*scenicq:\s*ignore\[([a-z\s,-]+)\]")
 
@@ -47,6 +52,20 @@ def lint(
     found |= {each: None for each in of_maps[0] if all(each in others for others in of_maps[1:])}
     told = [each for each in found if not _silenced(each)]
     return sorted(told, key=lambda each: each.span.start if each.span is not None else 0)
+
+
+def lint_query(query: Query, maps: Iterable[str] | None = None) -> list[Diagnostic]:
+    """What of a query's program compiles but cannot be meant, on some of the maps that it fits.
+
+    Args:
+        query: The query.
+        maps: Only these; all by default.
+
+    Raises:
+        ScenarioError: The program is wrong.
+    """
+    compiled = ((each.scenario, each.network) for each in islice(query.fitting(maps), LINTED_MAPS))
+    return lint(query.source, compiled, query.options.match, properties=False)
 
 
 def _silenced(diagnostic: Diagnostic) -> bool:

@@ -20,6 +20,7 @@ from scenicq.errors import DataError, Diagnostic, similar
 from scenicq.forest.nodes import Undefined, Value
 from scenicq.forest.scenario import Scenario
 from scenicq.geometry.angles import distance
+from scenicq.option_values import FURTHEST_M
 from scenicq.store.classes import ROOT, ancestors, is_class, subclasses
 
 __all__ = ["EXACT", "ROUNDING", "SLACK", "Margin", "Rule", "Tolerance", "parse_tolerance"]
@@ -251,6 +252,8 @@ def _number(text: str, item: str, units: Iterable[str]) -> float:
         raise _invalid(item, f"`{digits}` is not a number") from None
     if not (math.isfinite(value) and value >= 0):
         raise _invalid(item, "a tolerance is finite and not negative")
+    if value > FURTHEST_M:
+        raise _invalid(item, f"a tolerance is at most {FURTHEST_M:,.0f}")
     return math.radians(value) if text.endswith("deg") else value
 
 

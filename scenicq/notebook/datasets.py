@@ -15,6 +15,7 @@ import duckdb
 from scenicq.errors import DataError, Diagnostic, Source
 from scenicq.notebook.frames import Frame
 from scenicq.notebook.matches import Matches
+from scenicq.option_values import Text, read_option
 from scenicq.query.execution.option_texts import DRIVING, OptionTexts, read_options
 from scenicq.query.execution.program_files import read_program
 from scenicq.query.execution.run import Query
@@ -52,10 +53,9 @@ class OpenedDataset:
             ScenarioError: The program is wrong, or fits no map of the dataset.
             DataError: file-missing, file-invalid or option-invalid.
         """
-        unknown = sorted(options.keys() - OptionTexts.__annotations__.keys())
-        if unknown:
-            hint = f"known are {', '.join(OptionTexts.__annotations__)}"
-            raise DataError(Diagnostic("option-invalid", f"there is no option `{unknown[0]}`", hints=(hint,)))
+        if not isinstance(program, str | Path):  # pyright: ignore[reportUnnecessaryIsInstance] - whoever calls may pass anything
+            message = f"a program is a text or the path of a file, not {type(program).__name__}"
+            raise DataError(Diagnostic("option-invalid", message))
         is_file = isinstance(program, Path) or (program.endswith(".scenic") and "\n" not in program)
         source = read_program(program) if is_file else Source("<program>", str(program))
         texts = options if is_file else _with_model(options)
@@ -83,7 +83,7 @@ class OpenedDataset:
         Raises:
             DataError: option-invalid: there is no such frame.
         """
-        return Frame(self.dataset, self.dataset.label(frame))
+        return Frame(self.dataset, self.dataset.label(read_option("frame", Text("the name of a frame"), frame)))
 
     def __contains__(self, frame: object) -> bool:
         """Whether there is a frame of that name."""
@@ -132,6 +132,9 @@ def open(address: str | Path, *, notes: str | Path | None = None) -> OpenedDatas
     Raises:
         DataError: store-missing, store-version or store-damaged; dataset-invalid.
     """
+    if not isinstance(address, str | Path):  # pyright: ignore[reportUnnecessaryIsInstance]
+        message = f"the address of a dataset is a text or a path, not {type(address).__name__}"
+        raise DataError(Diagnostic("option-invalid", message))
     sound = _SOUND if notes is None else SoundNotes(Path(notes))
     dataset = open_dataset(address, check=False)
     if not sound.has(dataset.place, dataset.manifest):

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from scenicq.notebook.pictures import Picture
+from scenicq.notebook.pictures import Picture, take_picture
 from scenicq.report.backdrop import Backdrop
-from scenicq.report.picture import Shot, draw
+from scenicq.report.picture import Shot
 from scenicq.store.dataset import Dataset
 from scenicq.store.labels import Label, LabelObject
 
@@ -44,11 +44,13 @@ class Frame:
         """The frame from above.
 
         Args:
-            half: Metres from the ego to the edges; chosen if None.
-            width: In pixels.
+            half: Metres from the ego to the edges, 1 to 1,000; chosen if None.
+            width: In pixels, 50 to 10,000.
+
+        Raises:
+            DataError: option-invalid.
         """
-        backdrop = Backdrop(self.dataset.network(self.label.map))
-        return Picture(draw(Shot(self.label), backdrop, half=half, pixels=width))
+        return take_picture(Shot(self.label), Backdrop(self.dataset.network(self.label.map)), half, width)
 
     def _repr_svg_(self) -> str:
         return self.show().svg

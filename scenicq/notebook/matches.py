@@ -10,15 +10,17 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 from scenicq.errors import render
 from scenicq.evaluate.detection import Missing
 from scenicq.evaluate.evaluation import evaluate
+from scenicq.lint.program import lint_query
 from scenicq.match.matcher import Matcher
 from scenicq.match.verdict import NoMatch
 from scenicq.notebook.judgements import Judgement
-from scenicq.notebook.pictures import SCROLLS, DisplayedText, Picture
+from scenicq.notebook.pictures import SCROLLS, DisplayedText, Picture, take_picture
+from scenicq.option_values import SCORE, SEED, Choice, read_option
 from scenicq.query.execution.lazy_solver import LazySolver
 from scenicq.query.execution.result_origin import ORIGIN, name_origin
 from scenicq.query.execution.result_tables import result_schema, result_table
@@ -208,8 +210,8 @@ class Matches(Sequence[FrameResult]):
 
     @property
     def warnings(self) -> tuple[DisplayedText, ...]:
-        """What the author of the program should know."""
-        return tuple(DisplayedText(render(each)) for each in self.funnel.warnings)
+        """What the author of the program should know: what cannot be meant, and what no label has to compare."""
+        return tuple(DisplayedText(render(each)) for each in (*self.funnel.warnings, *lint_query(self.query)))
 
     def to_arrow(self) -> pa.Table:
         """The results as an Arrow table with a field a role, as `-o FILE.parquet` has it."""
@@ -250,14 +252,13 @@ class Matches(Sequence[FrameResult]):
 
         Args:
             frame: Its name; any frame of the dataset.
-            half: Metres from the ego to the edges; chosen if None.
-            width: In pixels.
+            half: Metres from the ego to the edges, 1 to 1,000; chosen if None.
+            width: In pixels, 50 to 10,000.
 
         Raises:
-            DataError: option-invalid: there is no such frame.
+            DataError: option-invalid: there is no such frame, or no such size.
         """
-        shot, backdrop = self._shot(frame)
-        return Picture(draw(shot, backdrop, half=half, pixels=width))
+        return take_picture(*self._shot(frame), half, width)
 
     def report(self, folder: str | Path, *, sensors: str | Path | None = None) -> Path:
         """Write a page with pictures of the results.
@@ -296,9 +297,12 @@ class Matches(Sequence[FrameResult]):
             seed: The same figures come from the same seed.
 
         Raises:
-            DataError: A file cannot be read or does not fit the dataset; option-invalid for another distance, or a
-                score that is no number.
+            DataError: A file cannot be read or does not fit the dataset; option-invalid for another distance, seed or
+                score, or another word for `missing`.
         """
+        seed = read_option("seed", SEED, seed)
+        missing = read_option("missing", Choice(get_args(Missing)), missing)
+        least_score = None if least_score is None else read_option("least_score", SCORE, least_score)
         name = Path(self.query.source.name.strip("<>")).stem
         results = {name: [each.result for each in self._all()]}
         judged = evaluate(results, self.query.dataset, predictions, distance_m=distance_m, least_score=least_score,

@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 
-__all__ = ["SCROLLS", "DisplayedText", "Picture"]
+from scenicq.errors import DataError, Diagnostic
+from scenicq.option_values import HALF, WIDTH, read_option
+from scenicq.report.backdrop import Backdrop
+from scenicq.report.picture import Shot, Style, draw
+from scenicq.report.png import png
+from scenicq.store.atomic_files import whole_file
+
+__all__ = ["SCROLLS", "DisplayedText", "Picture", "take_picture"]
 
 SCROLLS = "overflow-x:auto;max-width:100%;padding-bottom:8px"
 """Style of what may be long, so that it makes nothing else wide."""
@@ -18,13 +26,31 @@ class Picture:
 
     Attributes:
         svg: The picture as a file of SVG.
+        light: The same for what knows no style of the reader's, such as a converter to PNG.
     """
 
     svg: str
+    light: Callable[[], str]
 
     def save(self, path: str | Path) -> None:
-        """Write the picture into a file."""
-        Path(path).write_text(self.svg, encoding="utf-8")
+        """Write the picture into a file, completely or not at all.
+
+        Args:
+            path: Whose name ends in `.svg`, or in `.png`, which needs `scenicq[png]`.
+
+        Raises:
+            DataError: option-invalid: another ending, or nothing here makes PNG; target-unwritable.
+        """
+        target = Path(path)
+        if target.suffix.lower() not in (".svg", ".png"):
+            hints = ("known are .svg and .png",)
+            raise DataError(Diagnostic("option-invalid", f"the name {target} does not say which format", hints=hints))
+        data = png(self.light()) if target.suffix.lower() == ".png" else self.svg.encode()
+        try:
+            with whole_file(target) as file:
+                file.write(data)
+        except OSError as error:
+            raise DataError(Diagnostic("target-unwritable", f"{target}: {error.strerror}")) from None
 
     def _repr_svg_(self) -> str:
         return self.svg
@@ -45,3 +71,24 @@ class DisplayedText(str):
 
     def _repr_html_(self) -> str:
         return f'<pre style="{SCROLLS}">{escape(self)}</pre>'
+
+
+def take_picture(shot: Shot, backdrop: Backdrop, half: float | None, width: int) -> Picture:
+    """A picture of a frame.
+
+    Args:
+        shot: The frame, and what is said of it.
+        backdrop: The map.
+        half: Metres from the ego to the edges, 1 to 1,000; chosen if None.
+        width: In pixels, 50 to 10,000.
+
+    Raises:
+        DataError: option-invalid.
+    """
+    size = None if half is None else read_option("half", HALF, half)
+    pixels = read_option("width", WIDTH, width)
+
+    def drawn(style: Style) -> str:
+        return draw(shot, backdrop, half=size, pixels=pixels, style=style)
+
+    return Picture(drawn("adaptive"), lambda: drawn("light"))

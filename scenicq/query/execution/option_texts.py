@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal, TypedDict, Unpack
+import shlex
+import shutil
+from collections.abc import Mapping
+from typing import Any, Literal, TypedDict, Unpack, get_args
 
 from scenicq.compiler.temporal import Behaviors
-from scenicq.errors import DataError, Diagnostic
+from scenicq.errors import DataError, Diagnostic, SolverError
 from scenicq.forest.scenario import BuiltIn
 from scenicq.match.options import MatchOptions, Method
 from scenicq.match.tolerance import parse_tolerance
+from scenicq.option_values import FURTHEST_M, Amount, Choice, Count, Flag, Kind, Text, read_options_of
 from scenicq.query.execution.run import QueryOptions
 from scenicq.store.classes import Granularity
 from scenicq.temporal.interval_options import DEFAULT_GAP_S, IntervalOptions, Intervals
 
-__all__ = ["DRIVING", "VERSIONS", "OptionTexts", "read_built_ins", "read_options"]
+__all__ = ["DRIVING", "KINDS", "VERSIONS", "OptionTexts", "read_built_ins", "read_options"]
 
 _DEFAULTS = MatchOptions()
 
@@ -27,22 +31,22 @@ VERSIONS: dict[str, Literal[1, 2, 3]] = {"1": 1, "2": 2, "3": 3}
 class OptionTexts(TypedDict, total=False):
     """The options of `scenicq match` that say what a match is and how it is found, by the names of the command line.
 
-    None stands for the default everywhere.
+    None stands for the default where the type has it. Numbers may be texts, such as `timeout="5min"`.
     """
 
-    tolerance: str | None
+    tolerance: str | float | None
     classes: Granularity
     ego: Literal["label", "any"]
-    radius: float | None
+    radius: float | str | None
     enforce: str | None
     exact: bool
     solver: str
     method: Method
     prefilter: bool
-    jobs: int | None
-    timeout: float
-    budget: int
-    limit: int | None
+    jobs: int | str | None
+    timeout: float | str
+    budget: int | str
+    limit: int | str | None
     every: bool
     all_matches: bool
     strict: bool
@@ -50,10 +54,44 @@ class OptionTexts(TypedDict, total=False):
     initial: bool
     ignore_params: str | None
     behaviors: Behaviors | None
-    min_duration: float | None
+    min_duration: float | str | None
     intervals: Intervals
-    gap: float
+    gap: float | str
     model: str | None
+
+
+_SOLVERS = ("auto", "dreal", "portable")
+
+KINDS: Mapping[str, Kind] = {
+    "tolerance": Text("sizes such as position=0.25,heading=5deg, or one for all", numeric=True),
+    "classes": Choice(get_args(Granularity)),
+    "ego": Choice(("label", "any")),
+    "radius": Amount("m", most=FURTHEST_M, above=True),
+    "enforce": Text("names of built-in requirements, separated by commas"),
+    "exact": Flag(),
+    "solver": Text("the name of a solver"),
+    "method": Choice(get_args(Method)),
+    "prefilter": Flag(),
+    "jobs": Count(most=4096),
+    "timeout": Amount("s", above=True),
+    "budget": Count(),
+    "limit": Count(),
+    "every": Flag(),
+    "all_matches": Flag(),
+    "strict": Flag(),
+    "scenic": Choice(tuple(VERSIONS)),
+    "initial": Flag(),
+    "ignore_params": Text("names of parameters, separated by commas"),
+    "behaviors": Choice(("refuse", "ignore")),
+    "min_duration": Amount("s"),
+    "intervals": Choice(get_args(Intervals)),
+    "gap": Amount("s", above=True),
+    "model": Text("the name of a world model"),
+}
+"""What values the options have, by the names of the command line, for the command and for Python."""
+_OPTIONAL = frozenset({
+    "tolerance", "radius", "enforce", "jobs", "limit", "scenic", "ignore_params", "behaviors", "min_duration", "model",
+})  # fmt: skip
 
 
 def _names(text: str | None) -> list[str]:
@@ -84,6 +122,17 @@ def _enforced(text: str | None) -> frozenset[BuiltIn]:
     return asked if "none" in _names(text) else asked | _DEFAULTS.enforce
 
 
+def _check_solver(name: str) -> None:
+    """Refuse a name that nothing answers to at once, rather than at the first frame that needs the solver."""
+    try:
+        words = shlex.split(name)
+    except ValueError:
+        words = []
+    if name not in _SOLVERS and (not words or shutil.which(words[0]) is None):
+        hint = f"known are {', '.join(_SOLVERS)}, or a command that reads SMT-LIB 2, such as 'z3 -in'"
+        raise SolverError(Diagnostic("solver-missing", f"`{name}` is no solver, and no command here", hints=(hint,)))
+
+
 def read_options(**given: Unpack[OptionTexts]) -> QueryOptions:
     """The options of a query.
 
@@ -92,28 +141,26 @@ def read_options(**given: Unpack[OptionTexts]) -> QueryOptions:
 
     Raises:
         DataError: option-invalid.
+        SolverError: solver-missing.
     """
-    tolerance, scenic = given.get("tolerance"), given.get("scenic")
-    if scenic is not None and scenic not in VERSIONS:
-        hint = f"known are {', '.join(VERSIONS)}"
-        raise DataError(Diagnostic("option-invalid", f"there is no Scenic `{scenic}`", hints=(hint,)))
+    read = read_options_of(KINDS, given, _OPTIONAL)
+    tolerance, scenic = read.get("tolerance"), read.get("scenic")
+    _check_solver(read.get("solver", "auto"))
     options = MatchOptions(
         tolerance=_DEFAULTS.tolerance if tolerance is None else parse_tolerance(tolerance),
-        classes=given.get("classes", _DEFAULTS.classes),
-        ego=given.get("ego", _DEFAULTS.ego),
-        radius=given.get("radius"),
-        enforce=_enforced(given.get("enforce")),
-        exact=given.get("exact", _DEFAULTS.exact),
-        method=given.get("method", _DEFAULTS.method),
-        timeout_s=given.get("timeout", _DEFAULTS.timeout_s),
-        budget=given.get("budget", _DEFAULTS.budget),
-        ignore_params=_DEFAULTS.ignore_params.union(_names(given.get("ignore_params"))),
+        classes=read.get("classes", _DEFAULTS.classes),
+        ego=read.get("ego", _DEFAULTS.ego),
+        radius=read.get("radius"),
+        enforce=_enforced(read.get("enforce")),
+        exact=read.get("exact", _DEFAULTS.exact),
+        method=read.get("method", _DEFAULTS.method),
+        timeout_s=read.get("timeout", _DEFAULTS.timeout_s),
+        budget=read.get("budget", _DEFAULTS.budget),
+        ignore_params=_DEFAULTS.ignore_params.union(_names(read.get("ignore_params"))),
     )
-    time = IntervalOptions(
-        given.get("intervals", "longest"), given.get("min_duration"), given.get("gap", DEFAULT_GAP_S)
-    )
+    time = IntervalOptions(read.get("intervals", "longest"), read.get("min_duration"), read.get("gap", DEFAULT_GAP_S))
     same = ("solver", "initial", "prefilter", "jobs", "limit", "every", "all_matches", "strict", "model")
-    values: dict[str, Any] = {name: value for name, value in given.items() if name in same}
+    values: dict[str, Any] = {name: value for name, value in read.items() if name in same}
     version = None if scenic is None else VERSIONS[scenic]
-    behaviors: Behaviors = given.get("behaviors") or "refuse"
+    behaviors: Behaviors = read.get("behaviors") or "refuse"
     return QueryOptions(match=options, version=version, behaviors=behaviors, time=time, **values)

@@ -1,0 +1,28 @@
+"""Values of options on the command line: the kinds of `scenicq.option_values` as types of click."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from scenicq.option_values import Kind
+
+__all__ = ["OptionType"]
+
+
+class OptionType(click.ParamType):  # pyright: ignore[reportMissingTypeArgument] - click 8.1 has none
+    """The values of an option, in the words of all that reads options."""
+
+    name = "value"
+
+    def __init__(self, kind: Kind) -> None:
+        """Take the kind of its values."""
+        self.kind = kind
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """The value of a text, or of a default."""
+        try:
+            return self.kind.read(value)
+        except (ValueError, OverflowError):
+            self.fail(f"{value!r} is not {self.kind.expected}.", param, ctx)

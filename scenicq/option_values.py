@@ -1,0 +1,229 @@
+"""The values of options, as people, scripts and programs hand them over: each kind reads a text or a value of Python.
+
+A command line, an environment variable and an argument of a function are read by the same kinds, so that what one of
+them takes, the others take, and what one refuses, the others refuse in the same words.
+"""
+
+from __future__ import annotations
+
+import math
+import numbers
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal, Protocol
+
+from scenicq.errors import DataError, Diagnostic, similar
+
+__all__ = [
+    "FURTHEST_M", "HALF", "LONGEST_S", "SCORE", "SEED", "WIDTH", "Amount", "Choice", "Count", "Flag", "Kind", "Text",
+    "read_option", "read_options_of",
+]  # fmt: skip
+
+LONGEST_S = 2_000_000.0
+"""Seconds that an option may say: more than three weeks, and what system calls can wait for."""
+_MANY = 10**12
+"""A whole number beyond all that is counted."""
+FURTHEST_M = 1e6
+"""Metres that an option may say: more than any map."""
+
+_UNITS: Mapping[str, Mapping[str, float]] = {
+    "s": {"ms": 1e-3, "min": 60.0, "h": 3600.0, "s": 1.0},
+    "m": {"mm": 1e-3, "cm": 1e-2, "km": 1e3, "m": 1.0},
+    "": {},
+}
+"""Units that a text may end with, longer ones first, in the option's own."""
+_EXAMPLES = {
+    "s": "a time in seconds, such as 10, 90s or 5min,",
+    "m": "a length in metres, such as 30 or 30m,",
+    "": "a number",
+}
+
+
+class Kind(Protocol):
+    """What values an option has."""
+
+    @property
+    def expected(self) -> str:
+        """What is expected, for people."""
+        ...
+
+    def read(self, value: Any) -> Any:
+        """The value.
+
+        Raises:
+            ValueError: It is none of the kind.
+        """
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Flag:
+    """True or False."""
+
+    @property
+    def expected(self) -> str:
+        """What is expected, for people."""
+        return "True or False"
+
+    def read(self, value: Any) -> bool:
+        """The value."""
+        if not isinstance(value, bool):
+            raise ValueError
+        return value
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """One of some texts."""
+
+    texts: tuple[str, ...]
+
+    @property
+    def expected(self) -> str:
+        """What is expected, for people."""
+        *first, last = self.texts
+        return f"{', '.join(first)} or {last}" if first else last
+
+    def read(self, value: Any) -> str:
+        """The value."""
+        if not isinstance(value, str) or value not in self.texts:
+            raise ValueError
+        return value
+
+
+@dataclass(frozen=True, slots=True)
+class Count:
+    """A whole number."""
+
+    least: int = 1
+    most: int = _MANY
+
+    @property
+    def expected(self) -> str:
+        """What is expected, for people."""
+        bounds = [f"from {self.least:,}"] if self.least > -_MANY else []
+        bounds += [f"up to {self.most:,}"] if self.most < _MANY else []
+        return f"a whole number {' and '.join(bounds)}".rstrip()
+
+    def read(self, value: Any) -> int:
+        """The value."""
+        if isinstance(value, bool) or not isinstance(value, str | numbers.Integral):
+            raise ValueError
+        number = int(value)
+        if not self.least <= number <= self.most:
+            raise ValueError
+        return number
+
+
+@dataclass(frozen=True, slots=True)
+class Amount:
+    """A number, in a text with or without its unit.
+
+    Attributes:
+        unit: Of the value.
+        least: The least value.
+        most: The greatest one.
+        above: Whether the value is above the least.
+    """
+
+    unit: Literal["s", "m", ""]
+    least: float = 0.0
+    most: float = LONGEST_S
+    above: bool = False
+
+    @property
+    def expected(self) -> str:
+        """What is expected, for people."""
+        bounds = (
+            [f"over {self.least:g}" if self.above else f"from {self.least:,.12g}"] if math.isfinite(self.least) else []
+        )
+        bounds += [f"up to {self.most:,.12g}"] if math.isfinite(self.most) else []
+        return f"{_EXAMPLES[self.unit]} {' and '.join(bounds)}".rstrip()
+
+    def read(self, value: Any) -> float:
+        """The value."""
+        if isinstance(value, bool) or not isinstance(value, str | numbers.Real):
+            raise ValueError
+        size = 1.0
+        if isinstance(value, str):
+            unit = next((unit for unit in _UNITS[self.unit] if value.endswith(unit)), "")
+            value, size = value.removesuffix(unit).rstrip(), _UNITS[self.unit].get(unit, 1.0)
+        number = float(value) * size
+        if not math.isfinite(number) or not self.least <= number <= self.most or (self.above and number == self.least):
+            raise ValueError
+        return number
+
+
+@dataclass(frozen=True, slots=True)
+class Text:
+    """A text, which is read elsewhere; also a number where it stands for the text of it."""
+
+    what: str = "a text"
+    numeric: bool = False
+
+    @property
+    def expected(self) -> str:
+        """What is expected, for people."""
+        return self.what
+
+    def read(self, value: Any) -> str:
+        """The value."""
+        if isinstance(value, bool) or not isinstance(value, (str, numbers.Real) if self.numeric else str):
+            raise ValueError
+        return value if isinstance(value, str) else repr(float(value))
+
+
+HALF = Amount("m", 1.0, 1000.0)
+"""From the middle of a picture to its edges."""
+WIDTH = Count(50, 10_000)
+"""Pixels of a picture."""
+SEED = Count(0)
+"""Of random numbers."""
+SCORE = Amount("", -math.inf, math.inf)
+"""Of a prediction."""
+
+
+def read_option(name: str, kind: Kind, value: Any) -> Any:
+    """The value of an option.
+
+    Args:
+        name: Of the option.
+        kind: What values it has.
+        value: What somebody has written.
+
+    Raises:
+        DataError: option-invalid.
+    """
+    try:
+        return kind.read(value)
+    except (ValueError, OverflowError):
+        shown = repr(value) if len(repr(value)) <= 80 else f"{repr(value)[:80]}..."
+        raise DataError(Diagnostic("option-invalid", f"`{name}` is {kind.expected}, not {shown}")) from None
+
+
+def read_options_of(
+    kinds: Mapping[str, Kind], given: Mapping[str, Any], optional: Iterable[str] = ()
+) -> dict[str, Any]:
+    """The values of options that are given.
+
+    Args:
+        kinds: All options that there are.
+        given: What somebody has written, by the name of the option.
+        optional: Options for which None stands for the default.
+
+    Returns:
+        The values; None where that stands for the default.
+
+    Raises:
+        DataError: option-invalid.
+    """
+    for name in given:
+        if name not in kinds:
+            close = similar(name, kinds)
+            hint = f"did you mean `{close}`?" if close else f"known are {', '.join(kinds)}"
+            raise DataError(Diagnostic("option-invalid", f"there is no option `{name}`", hints=(hint,)))
+    may_lack = frozenset(optional)
+    return {
+        name: None if value is None and name in may_lack else read_option(name, kinds[name], value)
+        for name, value in given.items()
+    }
