@@ -22,7 +22,7 @@ from scenicq.temporal.run_machine import RunMachine
 from scenicq.temporal.run_notes import Notes
 from scenicq.temporal.run_steps import Ahead, RunSteps
 from scenicq.temporal.runs import Runs
-from scenicq.temporal.stretches import Stretches
+from scenicq.temporal.stretches import Timeline
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
 __all__ = ["Pieces", "follow_pieces", "follow_runs"]
@@ -50,13 +50,13 @@ class Pieces:
 
 
 def follow_runs(
-    machine: RunMachine, stretches: Stretches, atom: Callable[[Atom], Truth], which: NDArray[np.int64] | None = None
+    machine: RunMachine, stretches: Timeline, atom: Callable[[Atom], Truth], which: NDArray[np.int64] | None = None
 ) -> Runs:
     """What becomes of the runs from starts.
 
     Args:
         machine: The program.
-        stretches: Stretches with their starts.
+        stretches: Timeline with their starts.
         atom: The value of an atom at each place.
         which: The numbers of these starts; None for all.
     """
@@ -72,14 +72,14 @@ def follow_runs(
 
 
 def follow_pieces(
-    machine: RunMachine, stretches: Stretches, atom: Callable[[Atom], Truth], hidden: HiddenConditions,
+    machine: RunMachine, stretches: Timeline, atom: Callable[[Atom], Truth], hidden: HiddenConditions,
     possible: tuple[Numbers, Numbers] | None = None,
 ) -> Pieces:  # fmt: skip
     """What becomes of the runs from all starts, by the values of hidden numbers.
 
     Args:
         machine: The program.
-        stretches: Stretches with their starts.
+        stretches: Timeline with their starts.
         atom: The value of an atom that hangs on no hidden number at each place.
         hidden: The conditions that do.
         possible: Between which values of each variable each run may match, shape (starts, variables); other values are

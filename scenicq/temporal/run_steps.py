@@ -24,7 +24,7 @@ from scenicq.temporal.hidden_conditions import HiddenConditions
 from scenicq.temporal.run_machine import Advance, RunMachine
 from scenicq.temporal.run_notes import Notes
 from scenicq.temporal.runs import SLACK_S
-from scenicq.temporal.stretches import Stretches
+from scenicq.temporal.stretches import Timeline
 from scenicq.temporal.truth import FALSE, TRUE, Truth
 
 __all__ = ["Ahead", "LaneStep", "RunSteps", "times_out"]
@@ -96,7 +96,7 @@ class RunSteps:
     """
 
     machine: RunMachine
-    stretches: Stretches
+    stretches: Timeline
     atom: Callable[[Atom], Truth]
     which: NDArray[np.int64]
     hidden: HiddenConditions | None = None
@@ -113,11 +113,12 @@ class RunSteps:
         self.due = times_out(stretches, limit_s)[which]
         self._of = {} if self.hidden is None else self.hidden.of
         known = [number for number in self.machine.atoms if number not in self._of]
-        code = np.zeros(len(stretches.labels), np.int64)
-        for number in known:
-            code = _told_apart(code, self.atom(Atom(number)))
+        truths = [self.atom(Atom(number)) for number in known]
+        code = np.zeros(len(stretches), np.int64)
+        for truth in truths:
+            code = _told_apart(code, truth)
         firsts, self.code = alike(code)
-        told: list[list[int]] = [self.atom(Atom(number))[firsts].tolist() for number in known]
+        told: list[list[int]] = [truth[firsts].tolist() for truth in truths]
         self.rows: list[dict[int, int]] = [
             {number: values[row] for number, values in zip(known, told, strict=True)} for row in range(len(firsts))
         ]
@@ -344,7 +345,7 @@ def _at(sides: dict[int, NDArray[np.bool_]], which: NDArray[np.int64]) -> dict[i
     return {cut: each[which] for cut, each in sides.items()}
 
 
-def times_out(stretches: Stretches, after_s: float | None) -> Places:
+def times_out(stretches: Timeline, after_s: float | None) -> Places:
     """For each start the first place at which so many seconds are over, behind its stretch if there is none."""
     last = stretches.ends()
     if after_s is None or not math.isfinite(after_s):

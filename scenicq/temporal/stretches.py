@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scenicq.store.track_block import TrackBlock
 from scenicq.temporal.samples import BoundSamples
 
-__all__ = ["StartTable", "Stretches", "stretches_of"]
+__all__ = ["StartTable", "Stretches", "Timeline", "stretches_of"]
 
 Members = NDArray[np.int64]
 _AT_ONCE = 400_000
@@ -61,24 +61,22 @@ class StartTable:
 
 
 @dataclass(frozen=True, slots=True)
-class Stretches:
-    """Some stretches.
+class Timeline:
+    """The samples of some stretches, one stretch after the other, and where runs start.
 
     Attributes:
-        places: Their samples, one stretch after the other, shape (n,).
-        bounds: Where each begins, and where the last ends, shape (s + 1,).
-        labels: The label of each place, shape (n,).
-        seconds: Time of each place since the first sample of its recording.
+        bounds: Where each stretch begins, and where the last ends, shape (s + 1,).
+        seconds: Time of each place since the first sample of its recording, shape (n,).
         starts: Places of the starts in order, shape (m,).
-        numbers: The number of each start in its table.
     """
 
-    places: BoundSamples
     bounds: Members
-    labels: Members
     seconds: NDArray[np.float64]
     starts: Members
-    numbers: Members
+
+    def __len__(self) -> int:
+        """The number of places."""
+        return len(self.seconds)
 
     def heads(self) -> Members:
         """For each place the first one of its stretch."""
@@ -88,6 +86,30 @@ class Stretches:
         """For each start the last place of its stretch."""
         return self.bounds[np.searchsorted(self.bounds, self.starts, side="right")] - 1
 
+    def apart(self) -> Iterator[tuple[slice, slice]]:
+        """The places of each stretch, and which of the starts are its own."""
+        firsts = np.searchsorted(self.starts, self.bounds)
+        for number in range(len(self.bounds) - 1):
+            yield (
+                slice(int(self.bounds[number]), int(self.bounds[number + 1])),
+                slice(int(firsts[number]), int(firsts[number + 1])),
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class Stretches(Timeline):
+    """Stretches of recordings.
+
+    Attributes:
+        places: Who plays whom at each place.
+        labels: The label of each place, shape (n,).
+        numbers: The number of each start in its table.
+    """
+
+    places: BoundSamples
+    labels: Members
+    numbers: Members
+
     def some(self, chosen: NDArray[np.int64]) -> Stretches:
         """The stretches to which some places belong: all of theirs, in order."""
         which = np.unique(np.searchsorted(self.bounds, chosen, side="right") - 1)
@@ -96,13 +118,9 @@ class Stretches:
         before[1:] = np.cumsum(np.isin(np.repeat(np.arange(len(lengths)), lengths), which))
         mine = before[self.starts + 1] > before[self.starts]
         return Stretches(
-            self.places.at(chosen),
-            np.concatenate(([0], np.cumsum(lengths[which]))),
-            self.labels[chosen],
-            self.seconds[chosen],
-            before[self.starts[mine]],
-            self.numbers[mine],
-        )
+            np.concatenate(([0], np.cumsum(lengths[which]))), self.seconds[chosen], before[self.starts[mine]],
+            self.places.at(chosen), self.labels[chosen], self.numbers[mine],
+        )  # fmt: skip
 
     def only(self, which: NDArray[np.bool_]) -> tuple[Stretches, NDArray[np.int64]]:
         """The stretches of some starts with these alone, and which places they have."""
@@ -121,15 +139,6 @@ class Stretches:
         place = int(np.searchsorted(self.bounds, int(self.starts[number]), side="right"))
         first, end = int(self.bounds[place - 1]), int(self.bounds[place])
         return self.beginning(number).some(np.arange(first, end))
-
-    def apart(self) -> Iterator[tuple[slice, slice]]:
-        """The places of each stretch, and which of the starts are its own."""
-        firsts = np.searchsorted(self.starts, self.bounds)
-        for number in range(len(self.bounds) - 1):
-            yield (
-                slice(int(self.bounds[number]), int(self.bounds[number + 1])),
-                slice(int(firsts[number]), int(firsts[number + 1])),
-            )
 
 
 def stretches_of(table: StartTable, gap_s: float, *, apart: bool) -> Iterator[Stretches]:
@@ -166,7 +175,8 @@ def stretches_of(table: StartTable, gap_s: float, *, apart: bool) -> Iterator[St
         starts = bounds[mine] + labels[low:high] - labels[heads[first + mine]]
         recordings = np.array([run[0] for run in block.runs], dtype=np.int64)[block.recording_of[at]]
         seconds = (block.times_us[at] - block.times_us[recordings]) / 1e6
-        yield Stretches(BoundSamples(block, members, len(at)), bounds, at, seconds, starts, np.arange(low, high))
+        places = BoundSamples(block, members, len(at))
+        yield Stretches(bounds, seconds, starts, places, at, np.arange(low, high))
         first = last
 
 

@@ -8,14 +8,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["FALSE", "TRUE", "UNKNOWN", "Truth", "negated"]
+__all__ = ["FALSE", "TRUE", "UNKNOWN", "Truth"]
 
 Truth = NDArray[np.int8]
 """Truth values of any shape."""
 
 FALSE, UNKNOWN, TRUE = np.int8(0), np.int8(1), np.int8(2)
-
-
-def negated(values: Truth) -> Truth:
-    """`not`, of each."""
-    return TRUE - values

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from scenicq.forest.temporal import Always, And, Atom, Eventually, Formula, Next, Not, Or, Until
-from scenicq.temporal.ltlf import evaluate
+from scenicq.temporal.formula_values import FormulaValues
 
 ATOMS = 3
 LONGEST = 8
@@ -72,6 +72,8 @@ def compare_formulas(python: Path, count: int, seed: int = 1) -> int:
     different = 0
     for pair, line in zip(pairs, done.stdout.splitlines(), strict=True):
         columns = 2 * np.array(pair["trace"], dtype=np.int8)
-        values = evaluate(ours(pair["formula"]), lambda atom, c=columns: c[:, atom.number], np.arange(len(columns)))
-        different += [bool(value) for value in values[0]] != json.loads(line)
+        values = FormulaValues(ours(pair["formula"]))
+        ends = [columns[:end] for end in range(1, len(columns) + 1)]
+        found = [values.to_the_end(lambda atom, c=each: c[:, atom.number], len(each)) for each in ends]
+        different += [bool(each[0]) for each in found] != json.loads(line)
     return different

@@ -19,7 +19,7 @@ from scenicq.geometry.default_street import street
 from scenicq.temporal.run_lanes import follow_runs
 from scenicq.temporal.run_machine import RunMachine
 from scenicq.temporal.runs import Runs
-from scenicq.temporal.stretches import Stretches
+from scenicq.temporal.stretches import Timeline
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN
 
 NEVER = 1 << 60
@@ -146,11 +146,10 @@ def test_monitors_do_what_their_text_says(seed: int) -> None:
         times = np.cumsum([draw.choice([0.1, 0.1, 0.1, 0.2, 0.5]) for _ in range(n)])
         truth = {number: [draw.random() < 0.6 for _ in range(n)] for number in range(1, 100)}
         as_array = {atom: np.where(truth[number], TRUE, FALSE).astype(np.int8) for atom, number in numbers.items()}
-        every = np.arange(n)
-        stretches = Stretches(None, np.array([0, n]), every, times, every, every)  # type: ignore[arg-type]
+        timeline = Timeline(np.array([0, n]), times, np.arange(n))
 
-        def run(known: dict[int, np.ndarray], stretches: Stretches = stretches) -> Runs:
-            return follow_runs(RunMachine(dynamics), stretches, lambda each: known[each.number])
+        def run(known: dict[int, np.ndarray], timeline: Timeline = timeline) -> Runs:
+            return follow_runs(RunMachine(dynamics), timeline, lambda each: known[each.number])
 
         found = run(as_array)
         for start in range(n):

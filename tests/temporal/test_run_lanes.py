@@ -31,17 +31,17 @@ from scenicq.temporal.interval_options import IntervalOptions
 from scenicq.temporal.run_lanes import follow_pieces, follow_runs
 from scenicq.temporal.run_machine import RunMachine
 from scenicq.temporal.starts import StartSearch
-from scenicq.temporal.stretches import Stretches
+from scenicq.temporal.stretches import Timeline
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN
 
 
-def random_stretches(draw: random.Random) -> Stretches:
-    """Stretches of samples half a second apart, with some starts each; nothing is read of their places."""
+def random_stretches(draw: random.Random) -> Timeline:
+    """Stretches of samples half a second apart, with some starts each."""
     lengths = [draw.randint(1, 7) for _ in range(draw.randint(1, 4))]
     bounds = np.cumsum([0, *lengths])
     starts = sorted({0, *(draw.randrange(int(bounds[-1])) for _ in range(6))} | set(bounds[:-1].tolist()))
     seconds = np.concatenate([np.arange(length) / 2 for length in lengths])
-    return Stretches(None, bounds, np.arange(bounds[-1]), seconds, np.array(starts), np.arange(len(starts)))
+    return Timeline(bounds, seconds, np.array(starts))
 
 
 @dataclass
@@ -87,7 +87,7 @@ def compare_pieces(draw: random.Random, programs: int, *, limited: bool = False)
     matched = 0
     for _ in range(programs):
         stretches, machine = random_stretches(draw), RunMachine(random_dynamics(draw))
-        n, variables = len(stretches.labels), draw.choice([1, 1, 1, 2])
+        n, variables = len(stretches), draw.choice([1, 1, 1, 2])
         hidden = random_sides(draw, n, draw.sample(range(ATOMS), draw.randint(1, 2)), variables)
         known = [np.array(draw.choices([0, 1, 2], [4, 1, 4], k=n), dtype=np.int8) for _ in range(ATOMS)]
         pieces = follow_pieces(machine, stretches, lambda atom, known=known: known[atom.number], hidden)
@@ -137,7 +137,7 @@ def test_many_runs_by_values_of_hidden_numbers_are_those_with_each_value():
 
 def test_pieces_that_touch_and_stand_alike_are_one():
     n = 40
-    stretches = Stretches(None, np.array([0, n]), np.arange(n), np.arange(n) / 10, np.array([0]), np.array([0]))
+    stretches = Timeline(np.array([0, n]), np.arange(n) / 10, np.array([0]))
     hidden = HiddenSides(np.array([0.0]), np.array([100.0]), [Cut(0, np.arange(n) + 1.0)], {0: (0,)})
     hidden.values[0] = np.repeat([[2], [0]], n, axis=1)
     formula = Eventually(Atom(0))  # a new value becomes right at each sample
@@ -154,7 +154,7 @@ def test_pieces_that_touch_and_stand_alike_are_one():
 def test_however_many_conditions_hang_on_a_hidden_number_each_counts(count):
     """One of them decides, wherever it stands among the others."""
     n = 3
-    stretches = Stretches(None, np.array([0, n]), np.arange(n), np.arange(n) / 10, np.array([0]), np.array([0]))
+    stretches = Timeline(np.array([0, n]), np.arange(n) / 10, np.array([0]))
     spans = [Span(SOURCE, k, k + 1) for k in range(count)]
     for deciding in (0, count // 2, count - 1):
         cuts = [Cut(0, np.full(n, 50.0 if k == deciding else 10.0)) for k in range(count)]
@@ -180,14 +180,7 @@ def test_work_grows_as_the_samples_of_a_recording(monkeypatch, after):
     made = []
     for count, length in ((50, 20), (1, 1000)):
         n = count * length
-        stretches = Stretches(
-            None,
-            np.arange(count + 1) * length,
-            np.arange(n),
-            np.tile(np.arange(length) / 10, count),
-            np.arange(n),
-            np.arange(n),
-        )
+        stretches = Timeline(np.arange(count + 1) * length, np.tile(np.arange(length) / 10, count), np.arange(n))
         truth = [np.where(np.arange(n) // k % 2, TRUE, FALSE) for k in (1, 3)]
         formula = Always(Or((Not(Atom(0)), Eventually(Atom(1)))))
         ends = () if after is None else (Termination(Span(SOURCE, 2, 3), Atom(1)),)

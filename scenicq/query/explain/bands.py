@@ -14,8 +14,8 @@ from scenicq.forest.scenario import Scenario
 from scenicq.forest.temporal import Atom, Formula, Test, operands
 from scenicq.store.tracks import RecordingTracks
 from scenicq.temporal.atoms import AtomColumns, UnclearVariable
+from scenicq.temporal.formula_values import FormulaValues
 from scenicq.temporal.intervals import IntervalVerdict
-from scenicq.temporal.ltlf import evaluate
 from scenicq.temporal.samples import Samples
 from scenicq.temporal.truth import Truth
 
@@ -76,8 +76,8 @@ def bands_of(scenario: Scenario, tracks: RecordingTracks, interval: IntervalVerd
         for number in numbers:
             add(number)
         if all(number in known for number in numbers):
-            ends = np.array([interval.end - interval.start])
-            values = evaluate(requirement.formula, lambda atom: known[atom.number], ends)[:, 0]
+            formula = FormulaValues(requirement.formula, dynamics.conditions)
+            values = formula.to_the_end(lambda atom: known[atom.number], len(columns.samples))
             text = " ".join(requirement.span.text.split())
             found.append(Band(text, requirement.span, tuple(values.tolist()), is_requirement=True))
     for termination in dynamics.terminations:

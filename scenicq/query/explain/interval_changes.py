@@ -19,10 +19,10 @@ from scenicq.forest.temporal import Atom, Eventually, Formula, operands
 from scenicq.forest.walk import features, leaves, postorder, transform
 from scenicq.limits import LIMITS
 from scenicq.temporal.atoms import AtomColumns, UnclearVariable
-from scenicq.temporal.ltlf import evaluate
-from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
+from scenicq.temporal.formula_values import FormulaValues
+from scenicq.temporal.truth import TRUE, Truth
 
-__all__ = ["Change", "least_changes", "may_still_hold"]
+__all__ = ["Change", "least_changes"]
 
 _GREATER = (CompareOp.GT, CompareOp.GE)
 _ORDERS = (*_GREATER, CompareOp.LT, CompareOp.LE)
@@ -75,7 +75,7 @@ def least_changes(
         goes_on: Whether the interval is cut off, so that the formula need only be such that it may still hold.
         quick: Whether to bisect, which finds the least where the formula holds for all larger changes, too.
     """
-    asked = Eventually(formula) if ends else formula
+    asked = FormulaValues(Eventually(formula) if ends else formula)
     numbers = sorted({node.number for node in _atoms(formula)})
     try:
         known = {number: columns.truth(conditions[number]) for number in numbers}
@@ -109,25 +109,9 @@ def _comparisons(condition: Node) -> list[Compare]:
     ]
 
 
-def may_still_hold(formula: Formula, atom: Callable[[Atom], Truth]) -> bool:
-    """Whether a formula may hold from the first sample on if more samples come.
-
-    Args:
-        formula: The formula.
-        atom: The value of an atom at each sample so far.
-    """
-
-    def more(each: Atom) -> Truth:
-        # whatever comes is as good as one sample of which nothing is known
-        return np.append(atom(each), UNKNOWN)
-
-    size = len(atom(next(_atoms(formula))))
-    return bool(evaluate(formula, more, np.array([size]))[0, 0] != FALSE)
-
-
 def _least(
-    columns: AtomColumns, formula: Formula, known: Mapping[int, Truth], number: int, condition: Node, compare: Compare,
-    *, goes_on: bool, quick: bool,
+    columns: AtomColumns, formula: FormulaValues, known: Mapping[int, Truth], number: int, condition: Node,
+    compare: Compare, *, goes_on: bool, quick: bool,
 ) -> Change | None:  # fmt: skip
     """The least change of one comparison that makes a formula hold; None if there is none."""
     sides = [columns.number(columns.expanded(side)) for side in (compare.left, compare.right)]
@@ -136,7 +120,7 @@ def _least(
         return None
     gaps = left - right if compare.op in _GREATER else right - left
     amounts = np.unique(-gaps[np.isfinite(gaps)])
-    last = np.array([len(columns.samples) - 1])
+    size = len(columns.samples)
 
     def holds(amount: float) -> bool:
         def atom(each: Atom) -> Truth:
@@ -144,7 +128,7 @@ def _least(
                 return known[each.number]
             return columns.truth(transform(condition, lambda node: _let(node, compare, amount)))
 
-        return may_still_hold(formula, atom) if goes_on else bool(evaluate(formula, atom, last)[0, 0] == TRUE)
+        return formula.may_hold(atom, size) if goes_on else bool(formula.to_the_end(atom, size)[0] == TRUE)
 
     # just more than a difference lets its sample through, just less keeps it out
     spare = _SPARE * max(1.0, float(np.abs(amounts).max(initial=0.0)))
