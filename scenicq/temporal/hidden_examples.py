@@ -51,10 +51,10 @@ from scenicq.store.labels import Label
 from scenicq.temporal.atoms import AtomColumns
 from scenicq.temporal.definedness import untrue
 from scenicq.temporal.enclosures import Bounds, certainly, unchanging
-from scenicq.temporal.runs import Run
+from scenicq.temporal.runs import Runs
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
-__all__ = ["Example", "ExampleOutcome", "Examples", "Remembered", "examine_start"]
+__all__ = ["Example", "Examples", "Remembered", "examine_start"]
 
 Remembered = tuple[Label, Mapping[str, str]]
 """The label of a start, and its correspondence."""
@@ -106,14 +106,6 @@ class Example:
     truth: Mapping[int, Truth]
 
 
-@dataclass(frozen=True, slots=True)
-class ExampleOutcome:
-    """What some values make of a run, with an example of them."""
-
-    run: Run
-    example: Example
-
-
 @dataclass(slots=True)
 class Examples:
     """What the values of random variables can make of conditions, for one start.
@@ -137,7 +129,7 @@ class Examples:
     columns: AtomColumns
     conditions: Mapping[int, Node]
     first: int
-    decide: Callable[[Mapping[int, Truth]], Run]
+    decide: Callable[[Mapping[int, Truth]], Runs]
     found: list[Example] = field(default_factory=list[Example])
     _asked: int = 0
     _alike: dict[int, list[int]] = field(init=False)
@@ -146,26 +138,26 @@ class Examples:
         """Find where a condition is the same question."""
         self._alike = {number: self._first_alike(number) for number in self.conditions}
 
-    def outcomes(self) -> list[ExampleOutcome] | None:
-        """All that becomes of the run, of which some may be unknown; None without an example."""
+    def outcomes(self) -> list[tuple[Runs, Example]] | None:
+        """All that becomes of the run, each with an example, of which some may be unknown; None without any."""
         certain = self._certain()
         if certain is None:
             return None
-        found: list[ExampleOutcome] = []
+        found: list[tuple[Runs, Example]] = []
         cases: list[_Case] = [(certain, (), self.found[:])]
         while cases:
             look()
             known, assumed, examples = cases.pop()
             run = self.decide(known)
-            settled = run.truth != UNKNOWN and not run.open_
+            settled = run.truth[0] != UNKNOWN and not run.open_[0]
             place = None if settled else self._open_place(known, examples[0])
             if place is None:
-                found.append(ExampleOutcome(run, examples[0]))
+                found.append((run, examples[0]))
                 continue
             for truth in (FALSE, TRUE):
                 that = self._that(*place, holds=bool(truth == TRUE))
                 if that is None:
-                    found.append(ExampleOutcome(run, examples[0]))
+                    found.append((run, examples[0]))
                     continue
                 further = (*assumed, that)
                 fit = [each for each in examples if each.truth[place[0]][place[1]] == truth]
@@ -178,7 +170,7 @@ class Examples:
                     more[number][[other == self._alike[number][sample] for other in self._alike[number]]] = truth
                     cases.append((more, further, fit))
                 elif answer is not False:
-                    found.append(ExampleOutcome(run, examples[0]))
+                    found.append((run, examples[0]))
         return found
 
     def _open_place(self, known: Mapping[int, Truth], example: Example) -> _Place | None:

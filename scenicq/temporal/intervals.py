@@ -28,12 +28,13 @@ from scenicq.store.track_block import TrackReach
 from scenicq.store.tracks import TrackKey
 from scenicq.temporal.atoms import AtomColumns, reads_start
 from scenicq.temporal.hidden import random_variables
-from scenicq.temporal.hidden_runs import Detail, HiddenFound, HiddenRuns, Remembered
+from scenicq.temporal.hidden_runs import HiddenRuns, Remembered
 from scenicq.temporal.interval_options import IntervalOptions
 from scenicq.temporal.outcomes import Outcome, outcomes_of, steady_value
 from scenicq.temporal.presence import by_presence
 from scenicq.temporal.run_lanes import follow_runs
 from scenicq.temporal.run_machine import RunMachine
+from scenicq.temporal.runs import Detail, Runs
 from scenicq.temporal.samples import MOVING
 from scenicq.temporal.selection import chosen
 from scenicq.temporal.stretches import StartTable, Stretches, stretches_of
@@ -85,34 +86,6 @@ class Reported:
     intervals: list[IntervalVerdict]
     bindings: int = 0
     others: Counter[tuple[Span | None, bool]] = field(default_factory=Counter["tuple[Span | None, bool]"])
-
-
-@dataclass(slots=True)
-class _Found:
-    """Runs of a block side by side: labels, not samples."""
-
-    starts: NDArray[np.int64]
-    ends: NDArray[np.int64]
-    truth: Truth
-    origins: NDArray[np.int64]
-    broken: NDArray[np.object_]
-    cut_off: NDArray[np.bool_]
-    details: Mapping[tuple[int, int], Detail]
-
-    @staticmethod
-    def joined(parts: Sequence[_Found]) -> _Found:
-        """Some runs, then others."""
-        details = {number: each for part in parts for number, each in part.details.items()}
-        return _Found(
-            np.concatenate([part.starts for part in parts]), np.concatenate([part.ends for part in parts]),
-            np.concatenate([part.truth for part in parts]), np.concatenate([part.origins for part in parts]),
-            np.concatenate([part.broken for part in parts]), np.concatenate([part.cut_off for part in parts]), details,
-        )  # fmt: skip
-
-    def renumbered(self, numbers: NDArray[np.int64]) -> _Found:
-        """The same with other numbers of the starts."""
-        details = {(int(numbers[origin]), end): each for (origin, end), each in self.details.items()}
-        return replace(self, origins=numbers[self.origins], details=details)
 
 
 @dataclass(eq=False, slots=True)
@@ -182,7 +155,7 @@ class IntervalMatcher:
         """
         order, bindings = _sorted(table)
         table = table.chosen(order)
-        parts: list[_Found] = []
+        parts: list[Runs] = []
         for outcome in cast("list[int]", np.unique(table.outcomes).tolist()):
             which = np.flatnonzero(table.outcomes == outcome)
             # a machine has met nothing before, so that what becomes of a block hangs on no other one
@@ -192,46 +165,57 @@ class IntervalMatcher:
                 return remember(int(order[which[number]]))
 
             for stretches in stretches_of(own, self.options.gap_s, apart=program.apart):
-                parts += (part.renumbered(which) for part in self._followed(program, stretches, own, remembered))
+                for some, runs in self._followed(program, stretches, own, remembered):
+                    parts.append(runs.at(which[some.numbers], some.labels))
         if not parts:
             return Reported([])
-        found = self._reported(_Found.joined(parts), table, bindings, every=every)
-        told = [replace(each, origin=int(order[each.origin])) for each in found.intervals]
-        told.sort(key=lambda each: (each.recording, each.start, each.end, each.binding))
-        return replace(found, intervals=told)
+        found = Runs.joined(parts)
+        found = replace(found, truth=np.minimum(found.truth, np.where(table.sure[found.of], TRUE, UNKNOWN)))
+        return self._reported(found, table, order, bindings, every=every)
 
     def _followed(
         self, program: _Program, stretches: Stretches, table: StartTable, remember: Callable[[int], Remembered]
-    ) -> Iterator[_Found]:
+    ) -> Iterator[tuple[Stretches, Runs]]:
         """The runs of some stretches, those together in which the same features are observed."""
         dynamics = program.scenario.dynamics
         if dynamics is None:
-            yield _static(stretches, table)
+            yield stretches, _static(stretches, table)
             return
         for chosen_ in by_presence(stretches.places, *dynamics.conditions, stretches=stretches.bounds[:-1]):
             some = stretches if len(chosen_) == len(stretches.labels) else stretches.some(chosen_)
             columns = AtomColumns(program.scenario, some.places, start=some.heads())
             expanded = [columns.expanded(condition) for condition in dynamics.conditions]
-            yield self._dynamic(program, some, table, columns, expanded, remember)
+            runs = self._dynamic(program, some, columns, expanded, remember)
+            _tell_budget(runs, some, columns)
+            yield some, runs
 
     def _dynamic(
-        self, program: _Program, stretches: Stretches, table: StartTable, columns: AtomColumns,
-        expanded: Sequence[Node], remember: Callable[[int], Remembered],
-    ) -> _Found:  # fmt: skip
+        self, program: _Program, stretches: Stretches, columns: AtomColumns, expanded: Sequence[Node],
+        remember: Callable[[int], Remembered],
+    ) -> Runs:  # fmt: skip
         assert program.machine is not None
         if random_variables(expanded):
             hidden = HiddenRuns(program.machine, program.scenario, self.match, self.solver, self.reasons)
-            return _found(stretches, table, columns, hidden.follow(stretches, columns, expanded, remember))
-        runs = follow_runs(program.machine, stretches, columns.reader(expanded))
-        return _found(stretches, table, columns, HiddenFound(runs))
+            return hidden.follow(stretches, columns, expanded, remember)
+        return follow_runs(program.machine, stretches, columns.reader(expanded))
 
-    def _reported(self, found: _Found, table: StartTable, bindings: NDArray[np.int64], *, every: bool) -> Reported:
-        """What is reported of the runs of all bindings; see `intervals`."""
+    def _reported(
+        self, found: Runs, table: StartTable, order: NDArray[np.int64], bindings: NDArray[np.int64], *, every: bool
+    ) -> Reported:
+        """What is reported of the runs of all bindings.
+
+        Args:
+            found: The runs, from labels to labels.
+            table: The starts.
+            order: What the number of each was.
+            bindings: The number of the binding of each.
+            every: See `intervals`.
+        """
         starts, ends, truth = found.starts, found.ends, found.truth
         times = table.block.times_us
         lasting = (times[ends] - times[starts]) / 1e6
         least = self.options.min_duration_s or 0.0
-        own = bindings[found.origins]
+        own = bindings[found.of]
         count = len(np.unique(own))
         fit = (truth > FALSE) & (lasting >= least - 1e-6)
         # of most bindings no interval or one is in question
@@ -245,35 +229,48 @@ class IntervalMatcher:
             kept.append(
                 mine[chosen(starts[mine], ends[mine], truth[mine], lasting[mine], self.options.intervals, least)]
             )
-        told = [self._interval(found, table, each) for each in cast("list[int]", np.concatenate(kept).tolist())]
+        told = self._verdicts(found.some(np.concatenate(kept)), table, order)
         # what was cut off might have matched; else what was matched but is too short, else what came furthest
         open_ = np.flatnonzero(many[own] == 0)
         broken = cast("list[Span | None]", found.broken[open_].tolist())
         hopeful = found.cut_off[open_] & np.array([each is None for each in broken], dtype=np.bool_)
-        order = np.lexsort((-open_, -starts[open_], (ends - starts)[open_], truth[open_], hopeful, own[open_]))
-        best = open_[order[np.append(np.diff(own[open_[order]]) != 0, True)]] if len(open_) else open_
+        last = np.lexsort((-open_, -starts[open_], (ends - starts)[open_], truth[open_], hopeful, own[open_]))
+        best = found.some(open_[last[np.append(np.diff(own[open_[last]]) != 0, True)]] if len(open_) else open_)
+        others: Counter[tuple[Span | None, bool]] = Counter()
         if every:
-            told += [self._interval(found, table, each, no_match=True) for each in cast("list[int]", best.tolist())]
-            return Reported(told, count)
-        spans = cast("list[Span | None]", found.broken[best].tolist())
-        others = Counter(zip(spans, cast("list[bool]", found.cut_off[best].tolist()), strict=True))
+            told += self._verdicts(best.with_detail("", truth=int(FALSE)), table, order)
+        else:
+            others.update(zip(best.broken.tolist(), best.cut_off.tolist(), strict=True))
+        told.sort(key=lambda each: (each.recording, each.start, each.end, each.binding))
         return Reported(told, count, others)
 
-    def _interval(self, found: _Found, table: StartTable, number: int, *, no_match: bool = False) -> IntervalVerdict:
-        block, origin = table.block, int(found.origins[number])
-        start, end = int(found.starts[number]), int(found.ends[number])
-        truth = int(FALSE if no_match else found.truth[number])
-        recording = int(block.recording_of[start])
-        first, _ = block.runs[recording]
-        binding = tuple((index, block.key(int(members[origin]))) for index, members in sorted(table.members.items()))
-        reason, witness = found.details.get((origin, end), ("", {}))
-        made = self.outcomes[int(table.outcomes[origin])].witness
-        if truth == UNKNOWN and table.sure[origin]:
-            reason = reason or "unobserved"
-        return IntervalVerdict(
-            start - first, end - first, truth, binding, recording, origin,
-            {**made, **witness} if truth == TRUE else {}, reason, found.broken[number], bool(found.cut_off[number]),
-        )  # fmt: skip
+    def _verdicts(self, runs: Runs, table: StartTable, order: NDArray[np.int64]) -> list[IntervalVerdict]:
+        """Runs, one by one; arguments as of `_reported`."""
+        block = table.block
+        recordings = block.recording_of[runs.starts]
+        firsts = np.array([first for first, _ in block.runs], dtype=np.int64)[recordings]
+        tracks = [
+            [(index, block.key(each)) for each in members[runs.of].tolist()]
+            for index, members in sorted(table.members.items())
+        ]
+        columns = (runs.starts - firsts, runs.ends - firsts, runs.truth, recordings, order[runs.of], runs.cut_off)
+        outcomes = [self.outcomes[each] for each in cast("list[int]", table.outcomes[runs.of].tolist())]
+        rows = zip(*(each.tolist() for each in columns), strict=True)
+        sure = cast("list[bool]", table.sure[runs.of].tolist())
+        details = cast("list[Detail | None]", runs.details.tolist())
+        broken = cast("list[Span | None]", runs.broken.tolist())
+        nothing: Detail = "", {}
+        found: list[IntervalVerdict] = []
+        for place, (binding, row) in enumerate(zip(zip(*tracks, strict=True), rows, strict=True)):
+            start, end, truth, recording, origin, cut_off = row
+            reason, witness = details[place] or nothing
+            if truth == UNKNOWN and sure[place]:
+                reason = reason or "unobserved"
+            values = {**outcomes[place].witness, **witness} if truth == TRUE else {}
+            found.append(
+                IntervalVerdict(start, end, truth, binding, recording, origin, values, reason, broken[place], cut_off)
+            )
+        return found
 
 
 def _surest(
@@ -299,30 +296,17 @@ def _sorted(table: StartTable) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     return distinct[order], np.concatenate(([0], np.cumsum(changes))) if len(order) else np.empty(0, np.int64)
 
 
-def _found(stretches: Stretches, table: StartTable, columns: AtomColumns, found: HiddenFound) -> _Found:
-    """The runs of stretches as labels of their block; a start that is not sure makes a run that is not."""
-    runs, labels = found.runs, stretches.labels
-    which, ends = np.arange(len(stretches.starts)), runs.ends
-    truth, broken, cut_off = runs.truth, runs.broken, runs.cut_off
-    if found.others:
-        n = len(found.others)
-        others = np.array(found.others, dtype=np.int64)
-        which, ends = np.append(which, others[:, 0]), np.append(ends, others[:, 1])
-        truth, cut_off = np.append(truth, others[:, 2]), np.append(cut_off, np.zeros(n, np.bool_))
-        broken = np.append(broken, np.full(n, None, dtype=object))
-    origins = stretches.numbers[which]
-    truth = np.minimum(truth, np.where(table.sure[origins], TRUE, UNKNOWN))
-    details = {(number, int(labels[end])): each for (number, end), each in found.details.items()}
+def _tell_budget(runs: Runs, stretches: Stretches, columns: AtomColumns) -> None:
+    """Tell of runs that are unknown, and nothing is told of, whether a limit is why."""
     limited = runs.undecided.copy()
     for undecided in columns.undecided:
         before = np.concatenate(([0], np.cumsum(undecided)))
-        limited |= before[stretches.ends() + 1] > before[stretches.starts]
-    for start in np.flatnonzero(limited & (runs.truth == UNKNOWN)).tolist():
-        details.setdefault((int(stretches.numbers[start]), int(labels[runs.ends[start]])), ("budget", {}))
-    return _Found(labels[stretches.starts[which]], labels[ends], truth, origins, broken, cut_off, details)
+        limited |= before[stretches.ends()[runs.of] + 1] > before[stretches.starts[runs.of]]
+    for each in np.flatnonzero(limited & (runs.truth == UNKNOWN)).tolist():
+        runs.details[each] = runs.details[each] or ("budget", {})
 
 
-def _static(stretches: Stretches, table: StartTable) -> _Found:
+def _static(stretches: Stretches, table: StartTable) -> Runs:
     """Maximal runs of samples that each match, and those with samples among them of which that is not known."""
     n = len(stretches.labels)
     states = np.full(n, FALSE)
@@ -333,7 +317,7 @@ def _static(stretches: Stretches, table: StartTable) -> _Found:
     # runs end where stretches do
     heads = np.zeros(n + 1, np.bool_)
     heads[stretches.bounds] = True
-    pieces: list[tuple[NDArray[np.int64], NDArray[np.int64], Truth]] = []
+    pieces: list[tuple[tuple[NDArray[np.int64], NDArray[np.int64]], Truth]] = []
     for level in (TRUE, UNKNOWN):
         possible = np.append(states >= level, False)
         first = np.flatnonzero(possible[:-1] & (heads[:-1] | ~np.concatenate(([False], possible[:-2]))))
@@ -342,15 +326,13 @@ def _static(stretches: Stretches, table: StartTable) -> _Found:
             open_ = np.concatenate(([0], np.cumsum(states == UNKNOWN)))
             unsure = open_[end + 1] > open_[first]
             first, end = first[unsure], end[unsure]
-        pieces.append((first, end, np.full(len(first), level)))
-    first, end, truth = (np.concatenate([piece[part] for piece in pieces]) for part in range(3))
+        pieces.append(((first, end), np.full(len(first), level)))
+    first, end = (np.concatenate([piece[part] for piece, _ in pieces]) for part in (0, 1))
+    truth = np.concatenate([level for _, level in pieces])
     # the first start from there on, which may lie behind the run
     number = np.minimum(np.searchsorted(stretches.starts, first), len(stretches.starts) - 1)
     last = (
         np.searchsorted(stretches.starts, stretches.bounds[np.searchsorted(stretches.bounds, first, side="right")]) - 1
     )
-    origins = stretches.numbers[np.minimum(number, last)]
-    truth = np.minimum(truth, np.where(table.sure[origins], TRUE, UNKNOWN))
-    none = np.full(len(first), None, dtype=object)
-    labels = stretches.labels
-    return _Found(labels[first], labels[end], truth, origins, none, np.zeros(len(first), np.bool_), {})
+    runs = Runs.unknown(first, end)
+    return replace(runs, of=np.minimum(number, last), truth=truth)

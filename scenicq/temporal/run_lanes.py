@@ -8,7 +8,7 @@ cut lies within a piece, it falls in two. Pieces of one start that touch and sta
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,7 @@ from scenicq.temporal.runs import Runs
 from scenicq.temporal.stretches import Timeline
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
-__all__ = ["Pieces", "follow_pieces", "follow_runs"]
+__all__ = ["follow_runs"]
 
 Places = NDArray[np.int64]
 Numbers = NDArray[np.float64]
@@ -33,64 +33,27 @@ _TIMED_AT_ONCE = 32
 """Runs at once, where each has situations of its own."""
 
 
-@dataclass(frozen=True, slots=True)
-class Pieces:
-    """What became of runs by the values of hidden numbers.
-
-    Attributes:
-        of: The number of the start of each piece.
-        runs: What became of it.
-        low, high: Between which values of each variable, both included, shape (pieces, variables).
-    """
-
-    of: NDArray[np.int64]
-    runs: Runs
-    low: Numbers
-    high: Numbers
-
-
 def follow_runs(
-    machine: RunMachine, stretches: Timeline, atom: Callable[[Atom], Truth], which: NDArray[np.int64] | None = None
-) -> Runs:
-    """What becomes of the runs from starts.
-
-    Args:
-        machine: The program.
-        stretches: Timeline with their starts.
-        atom: The value of an atom at each place.
-        which: The numbers of these starts; None for all.
-    """
-    if which is None:
-        which = np.arange(len(stretches.starts))
-    runs = Runs.unknown(stretches.starts[which].copy())
-    for places in _at_once(machine, len(which)):
-        steps = RunSteps(machine, stretches, atom, which[places])
-        # each run has a time of its own, or what becomes of all that stand alike is the same
-        notes = _alone(steps) if machine.timed or steps.limited else _together(steps)
-        runs.replace(places, _runs_of(steps, notes, np.arange(len(places))))
-    return runs
-
-
-def follow_pieces(
-    machine: RunMachine, stretches: Timeline, atom: Callable[[Atom], Truth], hidden: HiddenConditions,
+    machine: RunMachine, timeline: Timeline, atom: Callable[[Atom], Truth], hidden: HiddenConditions | None = None,
     possible: tuple[Numbers, Numbers] | None = None,
-) -> Pieces:  # fmt: skip
-    """What becomes of the runs from all starts, by the values of hidden numbers.
+) -> Runs:  # fmt: skip
+    """What becomes of the runs from all starts, in their order: one for each, or several by values of hidden numbers.
 
     Args:
         machine: The program.
-        stretches: Timeline with their starts.
+        timeline: Samples with starts.
         atom: The value of an atom that hangs on no hidden number at each place.
-        hidden: The conditions that do.
+        hidden: The conditions that hang on some.
         possible: Between which values of each variable each run may match, shape (starts, variables); other values are
             not followed, nor runs that are lost. None where somebody reads what they fail at.
     """
-    starts = _at_once(machine, len(stretches.starts))
-    parts = [_pieces(RunSteps(machine, stretches, atom, which, hidden), possible) for which in starts]
-    return Pieces(
-        np.concatenate([each.of for each in parts]), Runs.joined([each.runs for each in parts]),
-        np.concatenate([each.low for each in parts]), np.concatenate([each.high for each in parts]),
-    )  # fmt: skip
+    parts: list[Runs] = []
+    for which in _at_once(machine, len(timeline.starts)):
+        steps = RunSteps(machine, timeline, atom, which, hidden)
+        # each run has a time of its own, or what becomes of all that stand alike is the same
+        alike = hidden is None and not machine.timed and not steps.limited
+        parts.append(_together(steps) if alike else _apart(steps, possible))
+    return Runs.joined(parts)
 
 
 def _at_once(machine: RunMachine, count: int) -> Iterator[NDArray[np.int64]]:
@@ -103,7 +66,7 @@ def _at_once(machine: RunMachine, count: int) -> Iterator[NDArray[np.int64]]:
         yield np.arange(first, min(first + size, count))
 
 
-def _together(steps: RunSteps) -> Notes:
+def _together(steps: RunSteps) -> Runs:
     """What became of all runs: what becomes of a run from a situation before a place is found once."""
     n = len(steps.code)
     last_at = np.repeat(steps.stretches.bounds[1:] - 1, np.diff(steps.stretches.bounds))
@@ -154,29 +117,12 @@ def _together(steps: RunSteps) -> Notes:
         later = successor[on]
         found.put(on, found.some(on).then(found.some(later)))
         successor[on] = successor[later]
-    return found.some(numbers[0][steps.starts].astype(np.int64))
+    runs = _runs_of(steps, found.some(numbers[0][steps.starts].astype(np.int64)), np.arange(len(steps.which)))
+    return replace(runs, of=steps.which)
 
 
-def _alone(steps: RunSteps) -> Notes:
-    """What became of runs, each with a time of its own."""
-    m = len(steps.which)
-    found = Notes.nothing(m)
-    owner, ahead = np.arange(m), steps.first()
-    while len(ahead):
-        look()
-        for situation, mine in groups(ahead.situation):
-            lanes = ahead.some(mine)
-            step = steps.step(situation, lanes, steps.exit(situation, lanes))
-            own = owner[mine][step.of]
-            found.put(own, found.some(own).then(step.notes))
-            ahead.situation[mine], ahead.at[mine] = step.ahead.situation, step.ahead.at
-        on = ahead.situation >= 0
-        owner, ahead = owner[on], ahead.some(on)
-    return found
-
-
-def _pieces(steps: RunSteps, possible: tuple[Numbers, Numbers] | None) -> Pieces:
-    """What became of the pieces of all runs."""
+def _apart(steps: RunSteps, possible: tuple[Numbers, Numbers] | None) -> Runs:
+    """What became of runs each of which has a time of its own, or of their pieces."""
     within = () if possible is None else (possible[0][steps.which], possible[1][steps.which])
     owner, ahead = np.arange(len(steps.which)), steps.first(*within)
     notes = Notes.nothing(len(owner))
@@ -227,9 +173,10 @@ def _pieces(steps: RunSteps, possible: tuple[Numbers, Numbers] | None) -> Pieces
             owner, notes, ahead = owner[~many], notes.some(~many), ahead.some(~many)
         stops = steps.exits(ahead)
     of = np.concatenate([each[0] for each in over])
-    runs = _runs_of(steps, Notes.joined([each[1] for each in over]), of)
-    ended = Ahead.joined([each[2] for each in over])
-    return Pieces(steps.which[of], runs, ended.low, ended.high)
+    order = np.argsort(of, kind="stable")
+    of, notes = of[order], Notes.joined([each[1] for each in over]).some(order)
+    runs, ended = _runs_of(steps, notes, of), Ahead.joined([each[2] for each in over]).some(order)
+    return replace(runs, of=steps.which[of], low=ended.low, high=ended.high)
 
 
 def _runs_of(steps: RunSteps, notes: Notes, of: NDArray[np.int64]) -> Runs:
@@ -239,7 +186,7 @@ def _runs_of(steps: RunSteps, notes: Notes, of: NDArray[np.int64]) -> Runs:
 
 def _open(steps: RunSteps, notes: Notes, of: NDArray[np.int64]) -> Runs:
     """Runs of a program without an end."""
-    runs = Runs.lost(steps.starts[of].copy())
+    runs = Runs.lost(steps.starts[of])
     for level, ends in ((UNKNOWN, notes.possible), (TRUE, notes.sure)):
         held = ends >= 0
         runs.truth[held], runs.ends[held] = level, ends[held]
@@ -256,7 +203,8 @@ def _closed(steps: RunSteps, notes: Notes, of: NDArray[np.int64]) -> Runs:
     matches, cut = notes.sure >= 0, notes.going
     several = notes.first_match < notes.sure
     unclear = matches & (several | (notes.failed >= 0) | cut | notes.undecided) | notes.undecided
-    runs = Runs.lost(np.maximum(notes.sure, notes.failed))
+    runs = Runs.lost(steps.starts[of])
+    runs.ends[:] = np.maximum(notes.sure, notes.failed)
     runs.truth[matches] = TRUE
     runs.truth[unclear] = UNKNOWN
     # where the last end itself is not seen, the first one may still be it

@@ -6,102 +6,101 @@ each i; any other may end anywhere, and then j is the last sample up to which ev
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scenicq.errors import Span
+from scenicq.match.verdict import WitnessValue
 from scenicq.temporal.truth import FALSE, UNKNOWN, Truth
 
-__all__ = ["SLACK_S", "Run", "Runs"]
+__all__ = ["SLACK_S", "Detail", "Runs"]
 
 SLACK_S = 1e-6
 """Seconds that floating point may be off."""
+
+Detail = tuple[str, Mapping[str, WitnessValue]]
+"""Why a run is unknown, and the values of random variables of conditions over time that prove a match."""
 
 Places = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True)
-class Run:
-    """What became of the run from one sample.
+class Runs:
+    """What became of runs, side by side; a start has several where other values of hidden numbers make others of it.
 
     Attributes:
-        start: The sample.
-        end: The last sample; of a run that is no match, how far it came.
-        truth: Whether it matches.
-        broken: What keeps it from matching, in the program; None where nothing does, and where it is cut off before
-            a requirement is lost for good.
+        of: The number of the start of each, shape (m,).
+        starts: First places.
+        ends: Last places; of a run that is no match, how far it came.
+        truth: Whether they match.
+        broken: What keeps each from matching, as an array of `Span | None`; None where nothing does, and where it is
+            cut off before a requirement is lost for good.
         cut_off: Whether the samples are over before the program ends.
         open_: Whether a later end is not excluded: of a match that what is unknown may let go on.
-        undecided: Whether it is unknown because there are too many ways in which it may go on.
-    """
-
-    start: int
-    end: int
-    truth: int
-    broken: Span | None = None
-    cut_off: bool = False
-    open_: bool = False
-    undecided: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class Runs:
-    """What became of runs, side by side; see `Run`.
-
-    Attributes:
-        ends: Last places, shape (m,).
-        truth: Whether they match.
-        broken: What keeps each from matching, as an array of `Span | None`.
-        cut_off: Whether the samples are over before the program ends.
-        open_: Whether a later end is not excluded.
         undecided: Whether there are too many ways in which they may go on.
+        details: What else is known of each, as an array of `Detail | None`.
+        low, high: Between which values of each hidden number, both included, shape (m, variables).
     """
 
+    of: NDArray[np.int64]
+    starts: Places
     ends: Places
     truth: Truth
     broken: NDArray[np.object_]
     cut_off: NDArray[np.bool_]
     open_: NDArray[np.bool_]
     undecided: NDArray[np.bool_]
+    details: NDArray[np.object_]
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        """The number of runs."""
+        return len(self.of)
 
     @classmethod
-    def unknown(cls, ends: Places) -> Runs:
-        """Runs of which nothing is known, with their ends."""
-        n = len(ends)
-        return cls(ends, np.full(n, UNKNOWN), np.full(n, None, dtype=object), *np.zeros((3, n), np.bool_))
+    def unknown(cls, starts: Places, ends: Places) -> Runs:
+        """Runs of which nothing is known, one for each start."""
+        m = len(starts)
+        broken, details = np.full((2, m), None, dtype=object)
+        a, b, c = np.zeros((3, m), np.bool_)
+        none = np.empty((m, 0))
+        return cls(np.arange(m), starts, ends, np.full(m, UNKNOWN), broken, a, b, c, details, none, none)
 
     @classmethod
-    def lost(cls, ends: Places) -> Runs:
-        """Runs that are no matches, with their ends."""
-        found = cls.unknown(ends)
+    def lost(cls, starts: Places) -> Runs:
+        """Runs that are no matches and come no further than their starts."""
+        found = cls.unknown(starts, starts.copy())
         found.truth[:] = FALSE
         return found
 
     @staticmethod
     def joined(parts: Sequence[Runs]) -> Runs:
-        """Some runs, then others."""
-        return Runs(*(np.concatenate([getattr(part, name) for part in parts]) for name in Runs.__slots__))
+        """Some runs, then others, all of the same hidden numbers."""
+        return Runs(*(np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(Runs)))
 
-    def some(self, which: NDArray[np.int64]) -> Runs:
-        """Some of them, by their numbers."""
-        return Runs(*(getattr(self, name)[which] for name in Runs.__slots__))
+    def some(self, which: NDArray[np.int64] | NDArray[np.bool_]) -> Runs:
+        """Some of them."""
+        return Runs(*(getattr(self, each.name)[which] for each in fields(self)))
 
-    def put(self, number: int, run: Run) -> None:
-        """Write down what became of one of them, by its number."""
-        self.ends[number], self.truth[number], self.broken[number] = run.end, run.truth, run.broken
-        self.cut_off[number], self.open_[number], self.undecided[number] = run.cut_off, run.open_, run.undecided
+    def at(self, numbers: NDArray[np.int64], places: Places) -> Runs:
+        """The same among other starts and places, whatever the hidden numbers are.
 
-    def replace(self, which: NDArray[np.int64], found: Runs) -> None:
-        """Write down what became of some of them, by their numbers."""
-        for name in Runs.__slots__:
-            getattr(self, name)[which] = getattr(found, name)
+        Args:
+            numbers: The new number of each start.
+            places: The new number of each place.
+        """
+        none = np.empty((len(self), 0))
+        own, first, last = numbers[self.of], places[self.starts], places[self.ends]
+        return replace(self, of=own, starts=first, ends=last, low=none, high=none)
 
-    def run(self, number: int, start: int) -> Run:
-        """One of them, by its number, with the place of its start."""
-        return Run(
-            start, int(self.ends[number]), int(self.truth[number]), self.broken[number],
-            bool(self.cut_off[number]), bool(self.open_[number]), bool(self.undecided[number]),
-        )  # fmt: skip
+    def with_detail(
+        self, reason: str, witness: Mapping[str, WitnessValue] | None = None, truth: int | None = None
+    ) -> Runs:
+        """The same with why they are unknown, or the values that prove them, and another truth value if it is given."""
+        details = np.full(len(self), None, dtype=object)
+        details.fill((reason, witness or {}))
+        values = self.truth if truth is None else np.full(len(self), truth, np.int8)
+        return replace(self, details=details, truth=values)

@@ -138,19 +138,20 @@ def compare(draw: random.Random, programs: int, *, limited: bool = False) -> int
         for places, mine in stretches.apart():
             own, seconds = rows[places], stretches.seconds[places].tolist()
             for number in range(mine.start, mine.stop):
-                run = found.run(number, int(stretches.starts[number]))
-                start = run.start - places.start
+                truth, end = int(found.truth[number]), int(found.ends[number]) - places.start
+                start = int(stretches.starts[number]) - places.start
                 value, ends = expected(dynamics, seconds, own, start)
-                if limited and run.truth == UNKNOWN:
+                if limited and truth == UNKNOWN:
                     continue
-                assert run.truth == value, (dynamics, own, start)
+                assert truth == value, (dynamics, own, start)
                 decided += value != UNKNOWN
                 if value == TRUE or (value == UNKNOWN and not dynamics.terminates):
-                    further = limited and run.open_ and run.end - places.start < max(ends)
-                    assert further or {run.end - places.start} == ends, (dynamics, own, start)
-                if value == FALSE and not run.cut_off:
-                    assert run.broken is not None
-                if run.cut_off and run.broken:
+                    further = limited and found.open_[number] and end < max(ends)
+                    assert further or {end} == ends, (dynamics, own, start)
+                cut_off, broken = found.cut_off[number], found.broken[number]
+                if value == FALSE and not cut_off:
+                    assert broken is not None
+                if cut_off and broken:
                     assert is_lost(dynamics, seconds, own, start), (dynamics, own, start)
     return decided
 
