@@ -10,7 +10,8 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, cast
 
-from scenicq.compiler.coerce import kind_of_model, to_node
+from scenicq.compiler.coerce import kind_of_model, to_heading, to_node, to_vector
+from scenicq.compiler.roots import oriented_point
 from scenicq.compiler.values import Choice, Delayed, Instance, ModelValue, fail, is_node
 from scenicq.errors import ScenarioError, Span
 from scenicq.forest.nodes import Constant, Identity, Node, Select, Undefined
@@ -28,6 +29,7 @@ __all__ = [
     "lift",
     "make_choice",
     "nothing_to_choose",
+    "of_common_type",
     "possible_values",
     "regions_apart",
 ]
@@ -131,6 +133,31 @@ def possible_values(value: ModelValue) -> Iterator[ModelValue]:
 def holds_instances(value: ModelValue) -> bool:
     """Whether a value is a random choice that may come out as a point or an object."""
     return isinstance(value, Choice) and any(isinstance(each, Instance) for each in possible_values(value))
+
+
+def of_common_type(value: ModelValue, span: Span | None) -> ModelValue:
+    """A random choice as one between what all its outcomes are: objects, oriented points, or places.
+
+    Scenic decides what is next to something before it is drawn, by the type that all outcomes have in common: of an
+    object among oriented points the box does not count, of an oriented point among places the heading does not.
+
+    Raises:
+        ScenarioError: wrong-type, for what is no place.
+    """
+    outcomes = list(possible_values(value))
+    instances = [each for each in outcomes if isinstance(each, Instance)]
+    if not instances:
+        return value
+    if len(instances) < len(outcomes) or not all(each.oriented for each in instances):
+        return to_vector(value, span)
+    if all(each.index is not None for each in instances):
+        return value
+
+    def as_point(each: ModelValue) -> ModelValue:
+        known = {"position": to_vector(each, span), "heading": to_heading(each, span)}
+        return oriented_point(known) if cast(Instance, each).index is not None else each
+
+    return lift(as_point, value, span=span, spread=is_choice)
 
 
 def lift(

@@ -14,7 +14,7 @@ from scenicq.compiler.environment import FIRST_NAMES, Budget
 from scenicq.compiler.following import follow
 from scenicq.compiler.operations import values_of
 from scenicq.compiler.orientations import orientation, surely_gives_a_heading
-from scenicq.compiler.random_values import holds_instances, lift, make_choice
+from scenicq.compiler.random_values import holds_instances, lift, make_choice, of_common_type
 from scenicq.compiler.specifiers import BoundSpecifier
 from scenicq.compiler.values import Choice, Delayed, Instance, ModelValue, fail
 from scenicq.errors import Span
@@ -289,7 +289,10 @@ def bind(node: ast.Specifier, evaluate: Evaluate, around: SpecifierContext) -> B
     """
     if isinstance(node, ast.WithSpecifier):
         return _with(node, evaluate(node.value), around)
-    bound = _bind_each(_MEANINGS[node.row], values_of(node, evaluate, around.ego), node.span, around)
+    values = values_of(node, evaluate, around.ego)
+    if node.row.operands[0].name == "reference":
+        values[0] = of_common_type(values[0], node.span)
+    bound = _bind_each(_MEANINGS[node.row], values, node.span, around)
     return _as_parent(bound) if around.version == 3 and "heading" in bound.optionally else bound
 
 

@@ -118,6 +118,20 @@ def test_a_place_beside_a_random_object_follows_the_object() -> None:
     assert places == {50 - 2 - 0.5, 90 - 4 - 0.5}
 
 
+def test_a_place_beside_a_random_thing_takes_what_all_outcomes_have_in_common() -> None:
+    beside = f"{EGO}p = new OrientedPoint at (10, 0), facing 90 deg\na = new Object at (50, 0), with width 4\n"
+    # no box counts beside an oriented point, which faces west; beside a place the own heading counts
+    for thing, places in {
+        "Uniform(p, a)": {10, 50 - 4 - 0.5},
+        "Uniform(a, (10, 0))": {10 - 4 - 0.5, 50 - 4 - 0.5},
+        "Uniform(Uniform(a, a), a)": {50 - 4 - 2 - 0.5},
+    }.items():
+        text = f"{beside}new Object left of {thing} by 4, facing 0 deg\n"
+        assert {round(last(text, seed)[0][0], 6) for seed in range(20)} == places
+    behind = f"{beside}new Object behind Uniform(p, (30, 0)) by 4, facing 0 deg\n"
+    assert {last(behind, seed)[0] for seed in range(20)} == {(10, -4.5), (30, -4.5)}
+
+
 numbers = st.floats(-50, 50).map(lambda x: round(x, 3))
 
 
