@@ -11,14 +11,16 @@ from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.forest.nodes import ArithmeticOp, Constant, DirectionAt, Feature, Index, Node, Select
 from scenicq.geometry import shapes
-from scenicq.geometry.elements import NetworkElement
+from scenicq.geometry.elements import Intersection, Maneuver, NetworkElement
 from scenicq.geometry.network import Network
 from scenicq.geometry.occupancy import TOLERANCE, ElementAtPoint, Layer, Occupancy
+from scenicq.geometry.passing_lanes import areas_at, areas_everywhere
+from scenicq.geometry.shapes import Shape
 
-__all__ = ["LOOKUPS", "LookupEntry", "LookupTable", "Lookups", "own"]
+__all__ = ["LOOKUPS", "LookupEntry", "LookupTable", "Lookups", "own", "ways_at", "ways_everywhere"]
 
-LookupEntry: TypeAlias = tuple[NetworkElement, "NetworkElement | None", NetworkElement]
-"""An element whose area counts, the one found there, and the one it is found for: at a point once for each of these."""
+LookupEntry: TypeAlias = tuple[NetworkElement, "NetworkElement | tuple[Maneuver, ...] | None", NetworkElement]
+"""An element whose area counts, what is found there, and what it is found for: at a point once for each of these."""
 
 
 def own(elements: Iterable[NetworkElement]) -> list[LookupEntry]:
@@ -60,6 +62,28 @@ def _directed(network: Network) -> list[list[LookupEntry]]:
     return [own(kind) for kind in kinds] + ([] if network.roads else [own(network.lanes)])
 
 
+def ways_at(intersection: Intersection, x: float, y: float) -> tuple[Maneuver, ...]:
+    """The ways through an intersection that hold a point, else those within the map's tolerance, else the nearest."""
+    ways, areas = _ways(intersection)
+    return tuple(ways[number] for number in areas_at(areas, x, y))
+
+
+def ways_everywhere(intersection: Intersection) -> list[list[LookupEntry]]:
+    """Where which ways through an intersection are those of `ways_at`."""
+    ways, areas = _ways(intersection)
+    found: list[list[LookupEntry]] = []
+    for layer in areas_everywhere(areas) if areas else []:
+        parts = [(NetworkElement(intersection.id, cast(Polygon, part)), held) for part, held in layer]
+        found.append([(part, tuple(ways[number] for number in held), part) for part, held in parts])
+    return found
+
+
+def _ways(intersection: Intersection) -> tuple[list[Maneuver], list[Shape]]:
+    """The ways through an intersection that have a lane there, and the areas of these."""
+    ways = [way for way in intersection.maneuvers if way.connectingLane is not None]
+    return ways, [way.connectingLane.polygon for way in ways if way.connectingLane is not None]
+
+
 LOOKUPS: dict[str, tuple[str, Callable[[Network], list[list[LookupEntry]]]]] = {
     "laneAt": ("lane", lambda network: [own(network.lanes)]),
     "laneSectionAt": ("lane", _lane_sections),
@@ -81,7 +105,7 @@ class LookupTable:
     def __init__(self, name: str, family: str, layers: list[list[LookupEntry]]) -> None:
         found = (element for layer in layers for _, element, _ in layer if element is not None)
         self.family = family
-        self.options: tuple[NetworkElement, ...] = tuple(dict.fromkeys(found))
+        self.options: tuple[NetworkElement | tuple[Maneuver, ...], ...] = tuple(dict.fromkeys(found))
         numbers = {element: number for number, element in enumerate(self.options)}
         nothing = len(self.options)
 

@@ -6,29 +6,27 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, cast
 
 from scenicq.compiler.coerce import to_vector
+from scenicq.compiler.element_lookups import ways_at
 from scenicq.compiler.following import follow
 from scenicq.compiler.known_properties import as_constant
 from scenicq.compiler.lanes_ahead import lanes_ahead
-from scenicq.compiler.lookups import among, look_up
+from scenicq.compiler.lookups import among, look_up, look_up_ways
 from scenicq.compiler.random_values import is_choice, lift
 from scenicq.compiler.road_attributes import worked_out
 from scenicq.compiler.values import Builtin, ModelValue, describe, fail
 from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.forest.nodes import Constant, DirectionAt, Node, Vector
-from scenicq.geometry import shapes
 from scenicq.geometry.elements import (
     Intersection,
     Lane,
     LaneGroup,
     LaneSection,
-    Maneuver,
     NetworkElement,
     Road,
     RoadSection,
 )
-from scenicq.geometry.network import TOLERANCE, Network
-from scenicq.geometry.regions import SLACK
+from scenicq.geometry.network import Network
 
 if TYPE_CHECKING:
     from scenicq.compiler.interpreter import Interpreter
@@ -80,7 +78,7 @@ def method_of(run: Interpreter, value: NetworkElement, name: str) -> Builtin | N
     if name == "nominalDirectionsAt" and value.orientation is not None:
         return nominal_directions(run, value)
     if name == "maneuversAt" and isinstance(value, Intersection):
-        return Builtin(name, lambda span, point: _maneuvers_at(run, value, point, span))
+        return Builtin(name, lambda span, point: look_up_ways(run, value, point, span))
     if name == "lanesAhead" and isinstance(value, Lane):
         return Builtin(name, lambda span, distance=50: build.constant(lanes_ahead(run, value, distance, span), span))
     if name == "shiftedBy" and isinstance(value, LaneSection):
@@ -111,14 +109,6 @@ def _finder(run: Interpreter, parts: Sequence[NetworkElement], name: str) -> Cal
     return find
 
 
-def _known_place(run: Interpreter, point: ModelValue, what: str, hint: str, span: Span) -> Vector:
-    where = as_constant(run, to_vector(point, span))
-    if not isinstance(where, Constant):
-        raise fail("unsupported-construct", f"`{what}` of a random point is not supported", span,
-                   "as many as there are there", (hint,))  # fmt: skip
-    return cast(Vector, where.value)
-
-
 def nominal_directions(run: Interpreter, owner: Network | NetworkElement) -> Builtin:
     """`nominalDirectionsAt`: the directions of traffic at a point, in an element or in whatever lies there."""
 
@@ -140,30 +130,9 @@ def _directions(element: ModelValue, place: Node, span: Span) -> ModelValue:
     x, y = cast(Vector, place.value)
     fields = [field]
     if isinstance(element, Intersection):
-        lanes = (maneuver.connectingLane for maneuver in _ways_at(element, x, y))
+        lanes = (maneuver.connectingLane for maneuver in ways_at(element, x, y))
         fields = [lane.orientation for lane in lanes if lane is not None and lane.orientation is not None]
     return tuple(heading for each in fields if (heading := each.first(x, y)) is not None)
-
-
-def _maneuvers_at(run: Interpreter, intersection: Intersection, point: ModelValue, span: Span) -> ModelValue:
-    """The ways through an intersection that pass a known point."""
-    hint = "choose a maneuver first, as in `Uniform(*intersection.maneuvers)`"
-    return _ways_at(intersection, *_known_place(run, point, "maneuversAt", hint, span))
-
-
-def _ways_at(intersection: Intersection, x: float, y: float) -> list[Maneuver]:
-    """The ways through an intersection that hold a point, else those within the map's tolerance, else the nearest."""
-    here = shapes.point(x, y)
-    away = {
-        maneuver: shapes.distance(maneuver.connectingLane.polygon, here)
-        for maneuver in intersection.maneuvers
-        if maneuver.connectingLane is not None
-    }
-    for limit in (SLACK, TOLERANCE):
-        found = [maneuver for maneuver, distance in away.items() if distance <= limit]
-        if found:
-            return found
-    return [min(away, key=away.__getitem__)] if away else []
 
 
 def _shifted(run: Interpreter, section: LaneSection, offset: ModelValue, span: Span) -> ModelValue:

@@ -12,18 +12,18 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, cast
 
 from scenicq.compiler.coerce import to_vector
-from scenicq.compiler.element_lookups import LOOKUPS, LookupTable, own
+from scenicq.compiler.element_lookups import LOOKUPS, LookupTable, own, ways_at, ways_everywhere
 from scenicq.compiler.known_properties import as_constant
 from scenicq.compiler.values import Choice, ModelValue, fail
 from scenicq.errors import Span
 from scenicq.forest.nodes import Constant, Vector
-from scenicq.geometry.elements import NetworkElement
+from scenicq.geometry.elements import Intersection, NetworkElement
 from scenicq.geometry.network import Network
 
 if TYPE_CHECKING:
     from scenicq.compiler.interpreter import Interpreter
 
-__all__ = ["among", "look_up"]
+__all__ = ["among", "look_up", "look_up_ways"]
 
 
 def look_up(
@@ -57,6 +57,15 @@ def among(
     return _at(run, key, table, point, reject, span, None)
 
 
+def look_up_ways(run: Interpreter, intersection: Intersection, point: ModelValue, span: Span) -> ModelValue:
+    """`intersection.maneuversAt(point)`: the ways through it that pass a point."""
+    key, name = ("maneuversAt", intersection.id), f"maneuversAt of {intersection.id}"
+    if not intersection.maneuvers:
+        return ()
+    table = run.lookups.table(key, name, name, lambda: ways_everywhere(intersection))
+    return _at(run, key, table, point, None, span, lambda x, y: ways_at(intersection, x, y), ())
+
+
 def _at(
     run: Interpreter,
     key: object,
@@ -64,12 +73,13 @@ def _at(
     point: ModelValue,
     reject: ModelValue,
     span: Span,
-    known: Callable[[float, float], NetworkElement | None] | None,
+    known: Callable[[float, float], ModelValue] | None,
+    nothing: ModelValue = None,
 ) -> ModelValue:
     run.budget.step(span, run.budget.LOOK_UP_STEPS)
     place = to_vector(point, span)
     certain = as_constant(run, place)
-    options = (*table.options, None)
+    options = (*table.options, nothing)
     if isinstance(certain, Constant):
         x, y = cast(Vector, certain.value)
         found = options[table.occupancy.at(x, y)[0]] if known is None else known(x, y)

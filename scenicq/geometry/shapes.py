@@ -273,6 +273,23 @@ def divided(shape: Shape, others: Sequence[Shape]) -> tuple[Shape, ...]:
     return tuple(face for face in faces if shapely.contains_xy(shape, *inner_point(face)))
 
 
+def places_along(shape: Shape, step: float) -> Coordinates:
+    """Places on the border of a shape, about `step` metres apart, to some centimetres."""
+    dense = shapely.get_coordinates(shapely.segmentize(shapely.boundary(shape), step))
+    places = np.unique(np.round(dense, 1), axis=0)
+    # where four are on one circle, as on a grid, GEOS makes no diagram
+    return places + np.random.default_rng(0).uniform(-0.02, 0.02, places.shape)
+
+
+def voronoi_cells(places: Coordinates, bounds: Bounds) -> list[Shape]:
+    """For each of some different places the part of a box that is nearest to it."""
+    cells = shapely.get_parts(shapely.voronoi_polygons(shapely.multipoints(places), extend_to=box(*bounds)))
+    cell, place = STRtree(points(places)).query(cells, predicate="contains")
+    found = np.empty(len(places), dtype=object)
+    found[place] = pair_intersections(cells[cell], np.full(len(cell), box(*bounds)))
+    return cast("list[Shape]", found.tolist())
+
+
 def eroded(shape: Shape, by: float) -> Shape:
     """A polygon without what lies within `by` metres of its boundary; slits narrower than 2 mm count as closed."""
     return shapely.buffer(shapely.buffer(shape, _SLIT, quad_segs=4), -by - _SLIT, quad_segs=4)

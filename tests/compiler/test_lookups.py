@@ -48,6 +48,10 @@ PROGRAMS = {
     "beside the curb": "ego = new Car\nspot = new OrientedPoint on ego.laneGroup.curb\nnew Car left of spot by 1\n",
     "sidewalk": "ego = new Car\nnew Pedestrian on ego.laneGroup.sidewalk\n",
     "crossing": f"{ANY}who = new Pedestrian on crossing\nrequire who.crossing is network.crossings[0]\n",
+    "ways on from there": (
+        "ego = new Car\nspot = new OrientedPoint in network.intersections[0]\n"
+        "new Car on Uniform(*network.intersections[0].maneuversAt(spot)).endLane\n"
+    ),
     "intersection": f"{ANY}new Car in ego.intersection, facing Range(-180, 180) deg\n",
     "nowhere": f"{ANY}require ego._lane is None and ego._element is ego._intersection\n",
     "part of a choice": (
@@ -243,6 +247,24 @@ def test_what_is_found_is_what_the_map_says() -> None:
             known = getattr(network(), name)(x, y)
             found = [(*table.options, None)[number] for number in table.occupancy.at(x, y)]
             assert known in found or shapely.distance(found[0].polygon, shapely.Point(x, y)) <= 0.05, (name, x, y)
+
+
+def test_the_ways_at_a_place_are_those_that_pass_it() -> None:
+    scene, rng = (
+        compiled(f"{HEADER}{ANY}require len(network.intersections[0].maneuversAt(ego)) == 1\n"),
+        random.Random(4),
+    )
+    matcher, seen = Matcher(scene, MatchOptions(tolerance=EXACT)), set[int]()
+    areas = [way.connectingLane.polygon for way in network().intersections[0].maneuvers]
+    west, south, east, north = shapely.total_bounds(areas)
+    for _ in range(60):
+        x, y = rng.uniform(west, east), rng.uniform(south, north)
+        count = max(1, sum(shapely.contains_xy(area, x, y) for area in areas))
+        if any(shapely.distance(area.boundary, shapely.Point(x, y)) < 0.06 for area in areas):
+            continue
+        seen.add(count)
+        assert isinstance(matcher.match(label([("Car", x, y, 0.0)])), Match if count == 1 else NoMatch)
+    assert seen > {1}
 
 
 @pytest.mark.parametrize(
