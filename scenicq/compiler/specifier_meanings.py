@@ -21,11 +21,15 @@ from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.forest.compute import fold
 from scenicq.forest.nodes import Constant, Feature, Index, Node, PointIn, RegionDifference, Select
+from scenicq.forest.value_numbers import ValueNumbers
 from scenicq.geometry.network import Network
 from scenicq.syntax import ast
 from scenicq.syntax.phrases import SPECIFIERS, PhraseRow, each_meaning
 
 __all__ = ["SpecifierContext", "bind"]
+
+_NOWHERE = build.bearing(build.constant((0.0, 0.0)))
+"""The heading of a line of no length."""
 
 Evaluate = Callable[[ast.Expression], ModelValue]
 
@@ -254,9 +258,19 @@ def _facing_point(away: bool, around: SpecifierContext, span: Span, target: Mode
             to_vector(_known(target, instance), span),
         )
         line = build.vector_difference(own, goal, span) if away else build.vector_difference(goal, own, span)
-        return {"heading": build.bearing(line, span)}
+        sight = build.bearing(line, span)
+        if around.version < 3 or not _is_same(to_vector(instance.properties["position"], span), goal):
+            return {"heading": sight}
+        # Scenic 3 turns the line by the parent's orientation and the heading back, which a line of no length shows
+        return {"heading": build.add(to_heading(instance.properties["parentOrientation"], span), _NOWHERE, span)}
 
-    return _specifier(span, "heading", evaluate, target, needs="position")
+    needs = "position" if around.version < 3 else "position parentOrientation"
+    return _specifier(span, "heading", evaluate, target, needs=needs)
+
+
+def _is_same(one: Node, other: Node) -> bool:
+    numbers = ValueNumbers()
+    return numbers.expression(one) == numbers.expression(other)
 
 
 def _apparently(around: SpecifierContext, span: Span, heading: ModelValue, origin: ModelValue) -> BoundSpecifier:

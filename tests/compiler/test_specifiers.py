@@ -132,6 +132,14 @@ def test_a_place_beside_a_random_thing_takes_what_all_outcomes_have_in_common() 
     assert {last(behind, seed)[0] for seed in range(20)} == {(10, -4.5), (30, -4.5)}
 
 
+def test_facing_toward_its_own_place_is_relative_to_the_parent() -> None:
+    for away in ("toward", "away from", "directly toward"):
+        text = f"{EGO}p = new OrientedPoint at (10, 0), facing 30 deg\nnew Object at p, facing {away} p\n"
+        assert same_angle(last(text, 0)[1], math.radians(-90))
+        held = text.replace(f"at p, facing {away} p", f"at p, facing {away} p, with parentOrientation 30 deg")
+        assert same_angle(last(held, 0)[1], math.radians(30 - 90))
+
+
 numbers = st.floats(-50, 50).map(lambda x: round(x, 3))
 
 
