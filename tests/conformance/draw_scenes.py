@@ -11,8 +11,8 @@ all means that none was found in time, nor the first one in "first" seconds, whe
 "witness": values, "labels": objects, "seconds": limit} asks whether the program allows them, see `replay_witness`.
 {"points": how many, "seed": number} and {"elements": points of each, "seed": number} ask the network, see
 `map_answers`. With --as-decided Scenic does what scenicq means to do otherwise, so that all that hangs on it can be
-compared: there is a direction of traffic off the road, views wider than 120 degrees are whole, and the ends of a random
-line are known to be oriented points.
+compared: there is a direction of traffic off the road, views wider than 120 degrees are whole, the ends of a random
+line are known to be oriented points, and what is required of mutated objects is so before the noise.
 """
 
 from __future__ import annotations
@@ -122,6 +122,26 @@ def _type_of_attribute(owner: Any, attribute: str) -> Any:
     return object_types.OrientedPoint if found in (object, None) and attribute in ("start", "end") else found
 
 
+NOISE: dict[type, Any] = {}
+"""What mutators do after a scene is found, rather than while it is drawn."""
+
+
+def _mutate_later() -> None:
+    """Requirements see objects without their noise."""
+    for mutator in (object_types.PositionMutator, object_types.OrientationMutator):
+        NOISE[mutator] = mutator.appliedTo
+        mutator.appliedTo = lambda self, thing: (thing, True)
+
+
+def _with_noise(thing: Any) -> Any:
+    """An object of a scene, with the noise that was left out."""
+    if NOISE and thing.mutationScale:
+        for mutator in filter(None, thing.mutator):
+            NOISE[type(mutator)](mutator, thing)
+        thing._recomputeDynamicFinals()
+    return thing
+
+
 PARSE, COMPILE = scenic.syntax.translator.parse_string, scenic.syntax.translator.compileScenicAST
 parse_file = functools.cache(PARSE)
 compile_tree = functools.cache(COMPILE)
@@ -143,7 +163,7 @@ def plain(scene: Any) -> dict[str, Any]:
     """A scene as plain data."""
     values = {name: value for name, value in scene.params.items() if isinstance(value, str | int | float | bool)}
     return {
-        "objects": [thing(each) for each in scene.objects],
+        "objects": [thing(_with_noise(each)) for each in scene.objects],
         "params": {name: value for name, value in values.items() if name != "map"},
     }
 
@@ -204,6 +224,7 @@ def main(arguments: list[str]) -> None:
         Network._defaultRoadDirection = _road_direction
         VectorField.followFrom = _follow
         AttributeDistribution.inferType = staticmethod(_type_of_attribute)
+        _mutate_later()
         SectorRegion._makePolygons = staticmethod(distributionFunction(_sector))
     Network.fromFile = functools.cache(Network.fromFile)  # one map for all programs
     network = Network.fromFile(str(chart))

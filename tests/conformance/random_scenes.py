@@ -205,8 +205,6 @@ def excuse(text: str, scene: dict[str, Any], why: str = "") -> str:
         return "size that is not positive"
     if re.search(r"Point on (?:ego|o\d+)\b", text) and "distance" in text:
         return "height of a point on an object"
-    if "mutate" in text and "require" in text.replace("with requireVisible", ""):
-        return "requirement on what is mutated"
     return ""
 
 
@@ -256,6 +254,9 @@ def towns(arguments: argparse.Namespace, python: Path, stack: ExitStack) -> list
     for name in arguments.towns:
         original = Original(python, charts[name], arguments.work / name, options=("--as-decided",))
         stack.callback(original.close)
+        original.draw(
+            "model scenic.domains.driving.model\nego = new Car\n", 0, 1, 60, 60
+        )  # the first waits for the map
         network = read_map(convert_xodr(charts[name], arguments.work / "maps", python=str(python)))
         found.append(Town(name, network, Places.of(network), original, arguments.work / "scenes"))
     return found

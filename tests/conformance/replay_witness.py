@@ -153,8 +153,8 @@ class _Conditioned:
         return bool(self.thing.mutationScale)
 
     def observe(self) -> None:
-        """What others refer to is where the label has it."""
-        for each, value in self.values:
+        """What others refer to is where the label has it, unless noise hides where it was before."""
+        for each, value in () if self.is_noisy else self.values:
             each.conditionTo(ConstantSamplable(value))
 
     def forget(self) -> None:
