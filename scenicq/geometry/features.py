@@ -187,7 +187,7 @@ def load_geojson(path: Path) -> Mapping[str, Any]:
         DataError: `file-missing` or `file-invalid`.
     """
     try:
-        return _object(json.loads(path.read_text(encoding="utf-8")))
+        return _object(json.loads(path.read_text(encoding="utf-8-sig")))
     except FileNotFoundError as error:
         raise DataError(Diagnostic("file-missing", f"{path}: no such file")) from error
     except (OSError, ValueError, RecursionError) as error:

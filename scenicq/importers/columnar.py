@@ -115,6 +115,8 @@ def _columns(
                 bound.add(decoded_bytes(chunk))
             if pa.types.is_dictionary(column.type):
                 column = column.cast(column.type.value_type)
+            if pa.types.is_timestamp(column.type) and name.endswith("_ns"):
+                column = column.cast(pa.timestamp("ns", column.type.tz)).cast(pa.int64())
             if _kind(column.type) not in ({"integer"} if kind == "integer" else {kind, "integer"}):
                 message = f"{path}: column `{name}` is of type {column.type}, not {kind}"
                 raise DataError(Diagnostic("file-invalid", message))

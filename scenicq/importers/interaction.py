@@ -9,7 +9,9 @@ have neither heading nor size, so none is observed.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 from scenicq.errors import DataError
@@ -123,8 +125,32 @@ def _read_tracks(place: RecordingFiles, classes: ClassNames, report: Report) -> 
                 members.setdefault(frame, []).append(_object(row, classes, report))
             except InvalidError as error:
                 report.left_out("object", "record-invalid", f"{file.name}: {place.name}: row {number}: {error}")
-    moments = [Moment(f"{place.name}/{frame}", times[frame] * 1000, tuple(members[frame])) for frame in sorted(members)]
+    told = _apart(members, place.name, report)
+    moments = [Moment(f"{place.name}/{frame}", times[frame] * 1000, tuple(told[frame])) for frame in sorted(members)]
     return with_egos(moments, choice or None, place.name, place.map, place.name, report)
+
+
+def _apart(members: dict[int, list[LabelObject]], name: str, report: Report) -> dict[int, list[LabelObject]]:
+    """The objects of each frame; of those that share an id at one time, people are numbered by themselves."""
+    shared: set[str] = set()
+    for found in members.values():
+        kinds = {(each.id, each.source_class) for each in found}
+        shared |= {key for key, count in Counter(key for key, _ in kinds).items() if count > 1}
+    if not shared:
+        return members
+    report.assumed(
+        "recording", "people numbered apart",
+        f"{name}: track {min(shared)} is a vehicle and a person at one time; such people are called `P` and the number",
+    )  # fmt: skip
+    return {
+        frame: [
+            replace(each, id=f"P{each.id}", track=f"P{each.id}")
+            if each.id in shared and each.source_class.startswith("pedestrian")
+            else each
+            for each in found
+        ]
+        for frame, found in members.items()
+    }
 
 
 def _object(row: Row, classes: ClassNames, report: Report) -> LabelObject:

@@ -268,7 +268,7 @@ def _rows(file: Path) -> list[list[str]]:
     try:
         if file.stat().st_size > _LARGEST_BYTES:
             raise DataError(Diagnostic("file-invalid", f"{file} is too large"))
-        return [line.split() for line in file.read_text(encoding="utf-8").splitlines()]
+        return [line.split() for line in file.read_text(encoding="utf-8-sig").splitlines()]
     except UnicodeDecodeError as error:
         raise DataError(Diagnostic("file-invalid", f"{file} is not text")) from error
     except OSError as error:

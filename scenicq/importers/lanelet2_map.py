@@ -149,13 +149,21 @@ def _places(root: Element, on_problem: ProblemSink) -> dict[str, _Place]:
     places: dict[str, _Place] = {}
     for node in root.iter("node"):
         try:
-            latitude, longitude = float(attribute(node, "lat")), float(attribute(node, "lon"))
+            latitude, longitude = (_degrees(node, name) for name in ("lat", "lon"))
             if not (abs(latitude) < 84 and abs(longitude - _MERIDIAN_DEG) < 30):
                 raise InvalidError("its place is outside of the zone of the projection")
             places[attribute(node, "id")] = utm(latitude, longitude)
         except ValueError as error:
             on_problem(node.get("id", ""), f"node: {error}")
     return places
+
+
+def _degrees(node: Element, name: str) -> float:
+    text = attribute(node, name)
+    try:
+        return float(text)
+    except ValueError:
+        raise InvalidError(f"`{name}` is not a number but `{text[:40]}`") from None
 
 
 def _tags(relation: Element) -> dict[str, str]:

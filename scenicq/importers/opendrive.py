@@ -13,8 +13,10 @@ import subprocess
 import sys
 import tempfile
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
+from xml.etree.ElementTree import Element
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.importers.report import Report
@@ -22,7 +24,7 @@ from scenicq.importers.specification import specification
 from scenicq.importers.xml_tree import read_xml
 from scenicq.store.atomic_files import whole_file, write_whole
 
-__all__ = ["SUFFIX", "convert_maps", "convert_xodr"]
+__all__ = ["SUFFIX", "convert_maps", "convert_xodr", "kept_files"]
 
 SUFFIX = ".xodr"
 _WORKER = Path(__file__).with_name("opendrive_worker.py")
@@ -59,6 +61,8 @@ def convert_maps(files: Mapping[str, Path], cache: Path, report: Report) -> dict
 def _tell_left_out(file: Path, report: Report) -> None:
     """Count what the map has and Scenic's parser does not read; crossings and lanes are told."""
     root = read_xml(file)
+    for lost in _dangling(root):
+        report.kept("map element", "map-invalid", f"{file.name}: {lost}")
     known = specification("opendrive")
     known.count_xml(root, report)
     if any(each.get("type") == "crosswalk" for each in root.iter("object")):
@@ -94,10 +98,7 @@ def convert_xodr(path: Path, cache: Path, *, python: str = sys.executable, timeo
         content = path.read_bytes()
     except OSError as error:
         raise DataError(Diagnostic("file-missing", f"map {path} cannot be read: {error.strerror}")) from error
-    worker = hashlib.sha256(_WORKER.read_bytes()).digest()
-    key = hashlib.sha256(worker + content).hexdigest()
-    kept = cache / f"{key}.geojson"
-    digest = cache / f"{key}.sha256"
+    kept, digest = kept_files(content, cache)
     if _is_whole(kept, digest):
         return kept
     try:
@@ -115,6 +116,31 @@ def convert_xodr(path: Path, cache: Path, *, python: str = sys.executable, timeo
         message = f"the map cache {cache} cannot be written: {error.strerror or error}"
         raise DataError(Diagnostic("target-unwritable", message)) from error
     return kept
+
+
+def _dangling(root: Element) -> Iterator[str]:
+    """References to roads and junctions that are not there."""
+    roads = {road.get("id") for road in root.iter("road")}
+    junctions = {junction.get("id") for junction in root.iter("junction")}
+    for junction in root.iter("junction"):
+        for connection in junction.iter("connection"):
+            for key in ("incomingRoad", "connectingRoad"):
+                if (name := connection.get(key)) not in roads:
+                    yield f"junction `{junction.get('id')}`: there is no {key} `{name}`"
+    for road in root.iter("road"):
+        for way in ("predecessor", "successor"):
+            link = road.find(f"link/{way}")
+            if link is not None:
+                name, kind = link.get("elementId"), link.get("elementType")
+                if name not in (junctions if kind == "junction" else roads):
+                    yield f"road `{road.get('id')}`: its {way} is {kind} `{name}`, which is not there"
+
+
+def kept_files(content: bytes, cache: Path) -> tuple[Path, Path]:
+    """Where a cache keeps what the parser gives for a map, and that file's SHA-256 as text."""
+    worker = hashlib.sha256(_WORKER.read_bytes()).digest()
+    key = hashlib.sha256(worker + content).hexdigest()
+    return cache / f"{key}.geojson", cache / f"{key}.sha256"
 
 
 def _is_whole(kept: Path, digest: Path) -> bool:
@@ -144,5 +170,7 @@ def _run(path: Path, command: list[str], folder: Path, timeout_s: float) -> None
     if done.returncode:
         lines = done.stderr.decode(errors="replace").strip().splitlines()
         why = lines[-1][:500] if done.returncode == _FAILED and lines else f"it ended with code {done.returncode}"
+        with suppress(DataError):  # it need not be XML
+            why = "; ".join([why, *list(_dangling(read_xml(path)))[:3]])
         hint = "Scenic 3.1.1 fails on some maps; a GeoJSON map can be given in its place"
         raise DataError(Diagnostic("file-invalid", f"map {path}: Scenic's parser cannot read it: {why}", hints=(hint,)))

@@ -97,7 +97,7 @@ class Directions:
 
 
 def explain(error: BaseException, source: str) -> str:
-    """What Scenic's parser stumbled over: its own words, the elements that it was at, and what is not there.
+    """What Scenic's parser stumbled over: its own words, and the elements that it was at.
 
     Args:
         error: What it raised.
@@ -109,8 +109,6 @@ def explain(error: BaseException, source: str) -> str:
     text = f"{type(error).__name__}: {words}" if words else type(error).__name__
     if at := list(dict.fromkeys(_elements_at(error))):
         text += f", at {', '.join(at[:3])}"
-    if lost := list(dict.fromkeys(_dangling(ElementTree.parse(source).getroot()))):  # noqa: S314 - Scenic has read it the same way
-        text += f"; {'; '.join(lost[:3])}"
     return text
 
 
@@ -133,24 +131,6 @@ def _elements_at(error: BaseException) -> Iterator[str]:
             name = getattr(value, "id_", getattr(value, "id_a", None))
             if called is not None and name is not None:
                 yield f"{called} `{name}`"
-
-
-def _dangling(root: ElementTree.Element) -> Iterator[str]:
-    """References to roads and junctions that are not there."""
-    roads = {road.get("id") for road in root.iter("road")}
-    junctions = {junction.get("id") for junction in root.iter("junction")}
-    for junction in root.iter("junction"):
-        for connection in junction.iter("connection"):
-            for key in ("incomingRoad", "connectingRoad"):
-                if (name := connection.get(key)) not in roads:
-                    yield f"junction `{junction.get('id')}`: there is no {key} `{name}`"
-    for road in root.iter("road"):
-        for way in ("predecessor", "successor"):
-            link = road.find(f"link/{way}")
-            if link is not None:
-                name, kind = link.get("elementId"), link.get("elementType")
-                if name not in (junctions if kind == "junction" else roads):
-                    yield f"road `{road.get('id')}`: its {way} is {kind} `{name}`, which is not there"
 
 
 def features_of(network: Any, directions: Directions) -> list[dict[str, Any]]:

@@ -95,7 +95,8 @@ def _list_scenarios(
             if name in places:
                 raise InvalidError(f"has the scenario `{name}` again")
         except InvalidError as error:
-            report.left_out("recording", "record-invalid", f"{where}: {error}")
+            hints = () if content is None else _other_messages(content)
+            report.left_out("recording", "record-invalid", f"{where}: {error}", hints=hints)
             continue
         digest = hashlib.blake2b(content, digest_size=16).hexdigest()
         weight = len(content) // _OBJECT_BYTES
@@ -107,6 +108,13 @@ def _list_scenarios(
             if "lane" in kinds and "intersection" not in kinds:
                 message = f"{file.name}: scenario {name}: no lane is `interpolating`: its map has no intersection"
                 report.assumed("map", "no intersections", message)
+
+
+def _other_messages(content: bytes) -> tuple[str, ...]:
+    """What to take instead of records that are messages of another kind: examples, or frames of the perception data."""
+    if b"state/current/x" in content or b"roadgraph_samples" in content:
+        return ("these are examples for TensorFlow: the folder `scenario` of the same data holds scenarios",)
+    return ()
 
 
 def _read_scenario(place: RecordingFiles, classes: ClassNames, report: Report) -> list[tuple[Label, str]]:

@@ -1,7 +1,6 @@
 """What users have met, through the installed command: ids, hints, streams, clocks, locales, and every format whole."""
 
 import csv
-import importlib.util
 import io
 import json
 import os
@@ -16,6 +15,8 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parents[1] / "importers"))
 
 from full_sources import FORMATS, entries, full
+
+from scenicq_cli.cache import user_cache
 
 SAMPLES = Path(__file__).parents[2] / "sample_data"
 A = "in everywhere, facing Range(0, 360) deg"
@@ -179,13 +180,15 @@ def test_whoever_writes_works_or_refuses_once_in_any_locale(words, asked, tmp_pa
 
 
 @pytest.mark.parametrize("format_", FORMATS)
-def test_every_format_whole(format_, command, tmp_path):
+def test_every_format_whole(format_, command, tmp_path, monkeypatch):
     """What holds all that its specification lists is ingested; what is left out of it is told by its name."""
-    if format_ == "opendrive" and importlib.util.find_spec("scenic") is None:
-        pytest.skip("Scenic is not installed")
     source = tmp_path / "source"
     source.mkdir()
     FORMATS[format_].write(full(format_), source)
+    for name in ("HOME", "XDG_CACHE_HOME", "LOCALAPPDATA"):
+        monkeypatch.setenv(name, str(tmp_path / "home"))
+    if format_ == "opendrive":
+        FORMATS[format_].keep_recorded(source, user_cache() / "maps")
     maps = [word for file in source.glob("*.xodr") for word in ("--map", file)]
     words = [command, "ingest", source, tmp_path / "d", "--format", FORMATS[format_].importer, *maps]
     done = subprocess.run(words, capture_output=True, text=True, check=False)

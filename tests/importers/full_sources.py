@@ -7,6 +7,7 @@ lists of members. `write` makes files of it, without the importers' help.
 from __future__ import annotations
 
 import copy
+import hashlib
 import json
 import struct
 from collections.abc import Iterator
@@ -19,6 +20,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from pyarrow import feather
 
+from scenicq.importers.opendrive import kept_files
 from scenicq.importers.tfrecord import crc32c
 
 SAMPLES = Path(__file__).parents[2] / "sample_data"
@@ -638,6 +640,19 @@ class OpenDrive:
 
     importer = "interchange"
     lists = ("opendrive",)
+    recorded = Path(__file__).with_name("opendrive_parsed.json")
+    """What Scenic's parser gives for the whole map: its features, under the SHA-256 of the map."""
+
+    def keep_recorded(self, folder: Path, cache: Path) -> None:
+        """Put the recorded result where an ingest finds it that has no Scenic."""
+        content = (folder / "town.xodr").read_bytes()
+        told = json.loads(self.recorded.read_text(encoding="utf-8"))
+        again = "the map is another: `pytest --update-golden -m slow -k parser_gives` records it anew, with Scenic"
+        assert told["map"] == hashlib.sha256(content).hexdigest(), again
+        made, digest = kept_files(content, cache)
+        cache.mkdir(parents=True)
+        made.write_text(json.dumps({"type": "FeatureCollection", "features": told["features"]}))
+        digest.write_text(hashlib.sha256(made.read_bytes()).hexdigest())
 
     def document(self) -> Document:
         types = {path.rpartition("/")[2]: True for path in entries("opendrive") if path.startswith("lane/@type/")}
@@ -715,7 +730,8 @@ class OpenDrive:
             root.append(to_element("road", self._street(100 + number, kind if kind in there else None)))
         ElementTree.ElementTree(root).write(folder / "town.xodr")
         (folder / "dataset.json").write_text('{"interchange": 1, "angle": "heading", "classes": "scenic"}')
-        label = {"id": "f", "recording": "r", "timestamp_us": 0, "map": "town", "objects": [], "ego": None}
+        ego = {"position": [10.0, -5.0], "heading": -1.57}
+        label = {"id": "f", "recording": "r", "timestamp_us": 0, "map": "town", "objects": [], "ego": ego}
         (folder / "labels.jsonl").write_text(json.dumps(label) + "\n")
 
     def _street(self, number: int, kind: str | None) -> Document:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import importlib.util
 import json
 import shutil
@@ -12,6 +13,7 @@ from xml.etree import ElementTree
 
 import pytest
 import shapely
+from full_sources import FORMATS, full
 
 from scenicq.errors import DataError
 from scenicq.geometry.features import read_geojson
@@ -211,14 +213,26 @@ class TestWhatScenicStumblesOver:
         text = self.explain(tmp_path, opendrive(road(7, 0, lane(1), lane(-1))), parse)
         assert text == "ValueError: could not convert string to float: 'x', at road `7`, lane `1`"
 
-    def test_what_is_not_there_is_named(self, tmp_path: Path) -> None:
+    @pytest.mark.parametrize("reads", [True, False])
+    def test_what_is_not_there_is_named(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, reads: bool) -> None:
         connection = '<connection id="0" incomingRoad="7" connectingRoad="9" contactPoint="start"/>'
         link = '<link><successor elementType="junction" elementId="3"/></link>'
         text = opendrive(
             road(7, 0, lane(1), lane(-1)).replace("<planView>", f"{link}<planView>"),
             f'<junction id="2">{connection}</junction>',
         )
-        said = self.explain(tmp_path, text, lambda root: {}[9])
+        worker = tmp_path / "worker.py"
+        fails = "sys.stderr.write('KeyError: 9')\nsys.exit(4)\n"
+        worker.write_text("import sys\n" + (f"open(sys.argv[2], 'w').write('{EMPTY}')\n" if reads else fails))
+        monkeypatch.setattr("scenicq.importers.opendrive._WORKER", worker)
+        (tmp_path / "town.xodr").write_text(text)
+        report = Report()
+        try:
+            convert_maps({"town": tmp_path / "town.xodr"}, tmp_path / "cache", report)
+            said = "; ".join(each.message for each in report.diagnostics)
+        except DataError as error:
+            said = error.diagnostics[0].message
+            assert "KeyError: 9; " in said
         assert "junction `2`: there is no connectingRoad `9`" in said
         assert "road `7`: its successor is junction `3`, which is not there" in said
 
@@ -231,6 +245,20 @@ class TestWhatScenicStumblesOver:
 
     def test_xml(self, tmp_path: Path) -> None:
         assert "not sound XML" in self.explain(tmp_path, "<a", lambda root: None)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(importlib.util.find_spec("scenic") is None, reason="Scenic is not installed")
+def test_the_recorded_map_is_what_the_parser_gives(tmp_path: Path, request: pytest.FixtureRequest) -> None:
+    whole = FORMATS["opendrive"]
+    whole.write(full("opendrive"), tmp_path)
+    content = (tmp_path / "town.xodr").read_bytes()
+    features = json.loads(convert_xodr(tmp_path / "town.xodr", tmp_path / "cache").read_text())["features"]
+    if request.config.getoption("--update-golden"):
+        lines = ",\n".join(json.dumps(each) for each in features)
+        told = f'{{"map": "{hashlib.sha256(content).hexdigest()}", "features": [\n{lines}\n]}}\n'
+        whole.recorded.write_text(told, encoding="utf-8")
+    assert json.loads(whole.recorded.read_text(encoding="utf-8"))["features"] == features
 
 
 @pytest.mark.slow
