@@ -9,8 +9,8 @@ from functools import cached_property
 import numpy as np
 
 from scenicq.forest.groups import Comparison
-from scenicq.forest.nodes import Constant, DirectionAt, Identity, Index, Leaf, Node
-from scenicq.forest.walk import is_leaf, postorder
+from scenicq.forest.nodes import Constant, DirectionAt, Identity, Index, Leaf, Logic, Node, Select
+from scenicq.forest.walk import children, conjuncts, is_leaf, postorder
 from scenicq.geometry.fields import FieldCell
 from scenicq.geometry.shapes import Bounds
 from scenicq.match.fields.interval_domain import Enclosure
@@ -51,6 +51,18 @@ class ConstraintNetwork:
                 allowed = self.tolerance.of(constraint.object, "heading").size + SLACK
                 found[id(node)] = np.array([[seen - allowed], [seen + allowed]])
         return found
+
+    @cached_property
+    def required(self) -> frozenset[int]:
+        """The ids of the nodes that have a value wherever all constraints hold: not so options, and alternatives."""
+        found: set[int] = set()
+        todo = [part for _, node, _ in self.items for part in conjuncts(node)]
+        while todo:
+            node = todo.pop()
+            if id(node) not in found and not isinstance(node, Logic):
+                found.add(id(node))
+                todo += (node.index,) if isinstance(node, Select) else children(node)
+        return frozenset(found)
 
     @cached_property
     def cells(self) -> dict[tuple[int, float, Bounds], list[FieldCell]]:

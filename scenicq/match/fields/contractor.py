@@ -6,7 +6,6 @@ whatever the expressions are made of. The bounds are never too narrow: a case of
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import cast
@@ -19,7 +18,6 @@ from scenicq.forest.bounds import FloatInterval, scalar_bounds, vector_bounds
 from scenicq.forest.groups import Comparison
 from scenicq.forest.nodes import (
     Arithmetic,
-    ArithmeticOp,
     Bearing,
     Compare,
     CompareOp,
@@ -31,20 +29,25 @@ from scenicq.forest.nodes import (
     Node,
     Norm,
     PointIn,
+    Range,
     Rotate,
     Scale,
     Select,
+    TruncatedNormal,
     Value,
     VectorOf,
     VectorSum,
 )
-from scenicq.forest.walk import conjuncts, is_leaf
+from scenicq.forest.walk import children, conjuncts, is_leaf
 from scenicq.limits import LIMITS
 from scenicq.match.fields.constraint_network import ConstraintNetwork
 from scenicq.match.fields.interval_domain import (
+    HALF_TURNS,
     Enclosure,
+    add,
     angle_of,
     common,
+    cone,
     divide,
     everything,
     lengths,
@@ -57,13 +60,16 @@ from scenicq.match.fields.interval_domain import (
     turns_near,
     wrapped,
 )
+from scenicq.match.fields.interval_functions import PARTIAL, arguments_of, range_of
 from scenicq.match.problem.conditioned import Item
-from scenicq.match.tolerance import SLACK
+from scenicq.match.tolerance import ROUNDING, SLACK
 
 __all__ = ["BoxSet"]
 
 _WORTH = 0.8
 """A pass that leaves more than this share of every range in every case is the last."""
+_OFF: Enclosure = np.array([[-2 * ROUNDING], [2 * ROUNDING]])
+"""Metres or radians that the evaluation of two sides may be off together."""
 
 
 @dataclass(eq=False)
@@ -95,10 +101,12 @@ class BoxSet:
         for identity, leaf in network.leaves.items():
             if identity in ranges:
                 known[identity] = np.array(ranges[identity], dtype=float).T.copy()
-            elif isinstance(leaf, PointIn):
-                known[identity] = np.repeat(np.array(vector_bounds(leaf))[..., None], size, axis=2)
-            else:
-                known[identity] = np.repeat(np.array(scalar_bounds(leaf))[:, None], size, axis=1)
+                continue
+            limits = np.array(vector_bounds(leaf) if isinstance(leaf, PointIn) else scalar_bounds(leaf))[..., None]
+            if not _is_known(leaf):
+                # they were worked out by plain arithmetic
+                limits = limits + np.array([[-SLACK], [SLACK]])
+            known[identity] = np.repeat(limits, size, axis=-1)
         return cls(network, size, known)
 
     @classmethod
@@ -208,16 +216,18 @@ class BoxSet:
             case _ if is_leaf(node):
                 if id(node) in self.chosen:
                     return np.stack([self.chosen[id(node)]] * 2)
-                return self.ranges[cast(Leaf, node).identity]
+                return self._support(cast(Leaf, node))
             case VectorOf():
                 return np.stack([self._scalar(node.x), self._scalar(node.y)])
             case VectorSum():
-                return self._vector(node.left) + self._vector(node.right)
+                return add(self._vector(node.left), self._vector(node.right))
             case Scale():
                 return times(self._vector(node.vector), self._scalar(node.factor))
             case Rotate():
                 angle = self.network.headings.get(id(node.angle), self._scalar(node.angle))
-                turn = self._turns[id(node)] = turning(np.broadcast_to(angle, (2, self.size)))
+                turn = self._turns.get(id(node)) if isinstance(node.angle, Constant) else None
+                if turn is None:
+                    turn = self._turns[id(node)] = turning(np.broadcast_to(angle, (2, self.size)))
                 return rotate(self._vector(node.vector), turn)
             case Coordinate():
                 return self._vector(node.vector)[node.axis]
@@ -226,13 +236,26 @@ class BoxSet:
             case Norm():
                 return lengths(self._vector(node.vector))
             case DirectionAt():
-                return self.chosen.get(id(node), np.array([[-math.pi], [math.pi]]))
+                chosen = self.chosen.get(id(node))
+                # one direction of a field is off by rounding from cell to cell
+                return HALF_TURNS if chosen is None else chosen + _OFF
             case Arithmetic():
-                return self._arithmetic(node)
+                return range_of(node.op, [self._scalar(arg) for arg in node.args])
             case Select():
                 return self._select(node)
             case _:
                 return None
+
+    def _support(self, leaf: Leaf) -> Enclosure:
+        """Where a random variable is, as far as it is known and its parameters allow."""
+        own = self.ranges[leaf.identity]
+        if not isinstance(leaf, Range | TruncatedNormal) or _is_known(leaf):
+            return own
+        low, high = [self._scalar(end) for end in (leaf.low, leaf.high)]
+        if isinstance(leaf, Range):
+            # the ends may come in either order
+            low, high = np.minimum(low, high), np.maximum(low, high)
+        return common(own, np.stack([low[0], high[1]]))
 
     def _select(self, node: Select) -> Enclosure | None:
         options = [self._bounds.get(id(option)) for option in node.options]
@@ -244,27 +267,6 @@ class BoxSet:
         if chosen is not None:
             return np.take_along_axis(stacked, chosen.astype(int).reshape((1,) * (stacked.ndim - 1) + (-1,)), axis=0)[0]
         return np.stack([stacked[..., 0, :].min(axis=0), stacked[..., 1, :].max(axis=0)], axis=-2)
-
-    def _arithmetic(self, node: Arithmetic) -> Enclosure:
-        args = [self._scalar(arg) for arg in node.args]
-        match node.op:
-            case ArithmeticOp.ADD:
-                return sum(args[1:], args[0])
-            case ArithmeticOp.SUB:
-                return subtract(args[0], args[1])
-            case ArithmeticOp.NEG:
-                return negative(args[0])
-            case ArithmeticOp.MUL:
-                return times(args[0], args[1])
-            case ArithmeticOp.DIV:
-                return divide(args[0], args[1])
-            case ArithmeticOp.WRAP:
-                return wrapped(args[0])
-            case ArithmeticOp.ABS:
-                low, high = args[0]
-                return np.stack([np.maximum(np.maximum(low, -high), 0.0), np.maximum(-low, high)])
-            case _:
-                return np.array(scalar_bounds(node))[:, None]
 
     # --- what is observed and what is required
 
@@ -290,6 +292,8 @@ class BoxSet:
                 left, right = self._scalar(node.left), self._scalar(node.right)
                 if left.ndim > 2 or right.ndim > 2:
                     return
+                # floating point makes the comparison, after which one side may be beyond the other by rounding
+                left, right = left + _OFF, right + _OFF
                 low, high = np.full(self.size, -np.inf), np.full(self.size, np.inf)
                 if node.op in (CompareOp.LT, CompareOp.LE, CompareOp.EQ):
                     self._meet(node.left, np.stack([low, right[1]]))
@@ -330,39 +334,23 @@ class BoxSet:
                 self._meet(node.vector, both)
             case Norm():
                 self._meet(node.vector, np.stack([[-own[1], own[1]]] * 2))
+            case Bearing():
+                self._meet(node.vector, cone(self._vector(node.vector), own))
             case Arithmetic():
-                self._arithmetic_back(node, own)
+                if node.op not in PARTIAL or id(node) in self.network.required:
+                    args = [self._scalar(arg) for arg in node.args]
+                    for arg, found in zip(node.args, arguments_of(node.op, own, args), strict=False):
+                        self._meet(arg, found)
             case _ if is_leaf(node):
                 identity = cast(Leaf, node).identity
                 self.ranges[identity] = self._bounds[id(node)] = common(own, self.ranges[identity])
             case _:
                 pass
 
-    def _arithmetic_back(self, node: Arithmetic, own: Enclosure) -> None:
-        args = [self._scalar(arg) for arg in node.args]
-        match node.op:
-            case ArithmeticOp.ADD:
-                for number, arg in enumerate(node.args):
-                    rest = own
-                    for other in (*args[:number], *args[number + 1 :]):
-                        rest = subtract(rest, other)
-                    self._meet(arg, rest)
-            case ArithmeticOp.SUB:
-                self._meet(node.args[0], own + args[1])
-                self._meet(node.args[1], subtract(args[0], own))
-            case ArithmeticOp.NEG:
-                self._meet(node.args[0], negative(own))
-            case ArithmeticOp.MUL:
-                self._meet(node.args[0], divide(own, args[1]))
-                self._meet(node.args[1], divide(own, args[0]))
-            case ArithmeticOp.DIV:
-                self._meet(node.args[0], times(own, args[1]))
-            case ArithmeticOp.WRAP:
-                self._meet(node.args[0], turns_near(own, args[0]))
-            case ArithmeticOp.ABS:
-                self._meet(node.args[0], np.stack([-own[1], own[1]]))
-            case _:
-                pass
+
+def _is_known(leaf: Leaf) -> bool:
+    """Whether the ends of what a random variable can be are numbers that the program has."""
+    return not isinstance(leaf, PointIn) and all(isinstance(part, Constant) for part in children(leaf))
 
 
 def _width(limits: Enclosure) -> NDArray[np.float64]:

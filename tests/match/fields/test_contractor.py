@@ -100,7 +100,7 @@ INVERTED = {
     "product": (op("*", A, B), 5.0, (2.0, 2.5)),
     "product, other side": (op("*", B, A), 5.0, (2.0, 2.5)),
     "quotient": (op("/", A, B), 2.0, (4.0, 5.02)),
-    "magnitude": (op("abs", op("+", A, number(10))), 4.0, (-9.0, -6.0)),
+    "magnitude": (op("abs", op("+", A, number(10))), 4.0, (-6.0, -6.0)),
     "x": (Coordinate(VectorOf(A, B), 0), 4.0, (4.0, 4.0)),
     "y": (Coordinate(VectorOf(B, A), 1), 4.0, (4.0, 4.0)),
     "of a sum": (Coordinate(VectorSum(VectorOf(A, B), Constant((1.0, 5.0))), 0), 4.0, (3.0, 3.0)),
@@ -114,6 +114,28 @@ INVERTED = {
         Coordinate(VectorSum(Scale(VectorOf(A, B), THREE), Rotate(VectorOf(A, A), number(math.pi / 2))), 0), 8.0,
         (4.0, 4.0),
     ),
+    "smaller": (op("min", A, number(5)), 4.0, (4.0, 4.0)),
+    "smaller of two": (op("min", op("+", A, number(8)), B), 1.5, (-6.5, -6.5)),
+    "greater": (op("max", A, number(2)), 4.0, (4.0, 4.0)),
+    "square": (op("**", op("+", A, number(9)), number(2)), 16.0, (-5.0, -5.0)),
+    "cube": (op("**", A, number(3)), -27.0, (-3.0, -3.0)),
+    "inverse": (op("**", op("+", A, number(9.5)), number(-1)), 0.25, (-5.65, -5.33)),
+    "root": (op("sqrt", A), 2.0, (3.96, 4.04)),
+    "sine": (op("sin", op("*", A, number(0.1))), 0.5, (5.12, 5.35)),
+    "cosine": (op("cos", op("*", op("+", A, number(9)), number(0.1))), 0.5, (1.36, 1.59)),
+    "tangent": (op("tan", op("*", A, number(0.1))), 1.0, (7.8, 7.9)),
+    "arc sine": (op("asin", op("*", A, number(0.1))), 0.5, (4.71, 4.88)),
+    "arc cosine": (op("acos", op("*", A, number(0.1))), 1.0, (5.32, 5.49)),
+    "arc tangent": (op("atan", A), 1.0, (1.53, 1.59)),
+    "direction": (op("atan2", A, B), 1.0, (3.06, 4.0)),
+    "growth": (op("exp", A), 5.0, (1.6, 1.62)),
+    "logarithm": (op("log", A), 1.0, (2.69, 2.75)),
+    "whole": (op("floor", A), 4.0, (4.0, 5.0)),
+    "whole above": (op("ceil", A), 4.0, (3.0, 4.0)),
+    "divided by": (op("/", number(8), op("+", A, number(10))), 2.0, (-6.02, -5.98)),
+    "heading": (Bearing(VectorOf(A, B)), -1.0, (3.06, 4.0)),
+    "heading ahead": (Bearing(VectorOf(B, A)), -1.0, (1.25, 1.64)),
+    "heading behind": (Bearing(VectorOf(B, A)), -2.0, (-1.18, -0.89)),
     "length": (Norm(VectorOf(A, number(0))), 4.0, (-4.0, 4.0)),
     "either": (Select(Index((1.0, 1.0)), (A, op("+", A, number(1)))), 4.0, (-9.0, 9.0)),
 }  # fmt: skip
@@ -192,6 +214,30 @@ def test_a_bearing_behind_may_be_on_either_side(low, high):
         items = [(Condition(Requirement(condition, None), condition), condition, None)]
         left = BoxSet.start(ConstraintNetwork(items, CLOSE), {}).narrowed()
         assert left.size or not holds
+
+
+@pytest.mark.parametrize(
+    "partial",
+    [op("sqrt", A), op("log", A), op("asin", op("-", A, number(2))), op("/", B, op("max", A, number(0))),
+     op("**", A, number(0.5))],
+)  # fmt: skip
+def test_what_has_no_value_in_an_option_that_is_not_chosen_bounds_nothing(partial):
+    either = Select(Index((1.0, 1.0)), (partial, number(7)))
+    for node in (either, op("+", either, op("*", A, number(0)))):
+        condition = Logic(LogicOp.AND, (Compare(CompareOp.GE, node, number(-99)), Compare(CompareOp.LE, A, number(-4))))
+        items = [(Condition(Requirement(condition, None), condition), condition, None)]
+        left = BoxSet.start(ConstraintNetwork(items, CLOSE), {}).narrowed()
+        assert left.size
+        assert left.ranges[A.identity][0, 0] == -9.0
+
+
+@pytest.mark.parametrize(("low", "high", "end"), [(-2, 5, -2.0), (5, -2, -2.0)])
+def test_a_range_between_random_ends_narrows_with_them(low, high, end):
+    first = Range(number(low), number(low))
+    inner = Range(op("+", first, number(0.5)), number(high))
+    left = narrowed(inner, -1.0 if low > high else 4.0)
+    assert left.size
+    assert not narrowed(inner, end - 0.1 if low > high else -1.7).size
 
 
 def test_a_choice_that_is_made_leaves_its_option():

@@ -71,6 +71,16 @@ def test_enclosures_of_points_are_points():
     assert np.isinf(interval_domain.divide(one, zero)).all()
 
 
+@pytest.mark.parametrize("beside", [-6e-20, 6e-20, -1e-12])
+def test_a_box_that_covers_almost_half_a_turn_has_any_heading(beside):
+    """Seen from a place next to a long side, rounding does not tell whether it passes ahead or behind."""
+    box = np.array([[[-14.5], [9.7]], [[beside], [beside]]])
+    low, high = interval_domain.angle_of(box)[:, 0]
+    for x in (-14.5, -1e-19, 1e-16, 9.7):
+        heading = math.atan2(-x, beside)
+        assert any(low <= heading + turn <= high for turn in (-math.tau, 0.0, math.tau))
+
+
 @pytest.mark.parametrize(("cars", "labels"), [(1, 3), pytest.param(3, 6, marks=pytest.mark.slow)])
 def test_chains_through_an_intersection_are_decided_without_a_solver(cars, labels):
     scenario = compiled("model scenic.domains.driving.model\n" + CHAIN.format(cars=cars), STREET)
