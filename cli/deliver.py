@@ -14,12 +14,13 @@ from pathlib import Path
 import click
 
 from scenicq.match.verdict import NoMatch
+from scenicq.query.execution.records import record
 from scenicq.query.execution.result_origin import name_origin
 from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query
 from scenicq.store.atomic_files import sole_writer
 
-from .formats import make_writer, result_writer
+from .formats import make_writer
 from .output import ProgressBar, destination, writing
 from .report import count, show_few
 from .sources import sensor_root
@@ -91,10 +92,9 @@ def _deliver(
                 ranked=wanted.ranked,
                 over_time=query.is_over_time(),
             )
-        write = result_writer(writer, origin)
         for result in itertools.chain(_kept(results, shown), _kept(near, close)):
             with bar.aside(), writing(file):
-                write(result)
+                writer.write(record(result, origin))
             unlisted += wanted.form == "ids" and isinstance(result.verdict, NoMatch)
             if exporter is not None:
                 exporter.add(result)

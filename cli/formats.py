@@ -10,18 +10,18 @@ import csv
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any, BinaryIO, Protocol, TextIO
 
+from msgspec import UNSET
+
 from scenicq.errors import plain_json
 from scenicq.query.execution.csv_cells import SPREADSHEET_MARK, quote_cell
-from scenicq.query.execution.result_lines import json_line, json_text
-from scenicq.query.execution.result_origin import ORIGIN
-from scenicq.query.execution.result_tables import DENSITY_COLUMNS, result_schema, result_table
-from scenicq.query.execution.results import Result, record
+from scenicq.query.execution.records import DENSITY, FrameRecord, IntervalRecord, Record, json_text
+from scenicq.query.execution.result_tables import result_schema, result_table
 from scenicq.store.frame_names import ShortNames
 
 from .report import plain
 from .table import Table, TextStream
 
-__all__ = ["FORMATS", "SPREADSHEET_HELP", "CsvRows", "Writer", "make_writer", "result_writer"]
+__all__ = ["FORMATS", "SPREADSHEET_HELP", "CsvRows", "Writer", "make_writer"]
 
 FORMATS = ("table", "jsonl", "csv", "spreadsheet", "parquet", "ids")
 """Names of the formats."""
@@ -31,36 +31,12 @@ SPREADSHEET_HELP = (
     "and is read back without it."
 )
 
-_COLUMNS: tuple[str, ...] = (
-    "frame",
-    "recording",
-    "timestamp_us",
-    "verdict",
-    "correspondence",
-    "witness",
-    "cause",
-    "sensors",
-)
-
-
-_INTERVAL_COLUMNS: tuple[str, ...] = (
-    "recording",
-    "start_us",
-    "end_us",
-    "frames",
-    "verdict",
-    "correspondence",
-    "witness",
-    "cause",
-    "open_ended",
-)
-
 
 class Writer(Protocol):
-    """Writes results one by one: records, which name their dataset if it is known."""
+    """Writes results one by one."""
 
-    def write(self, record: Mapping[str, Any]) -> None:
-        """Write one result as `scenicq.query.execution.results.record` gives it."""
+    def write(self, record: Record) -> None:
+        """Write one result."""
         ...
 
     def finish(self) -> None:
@@ -71,46 +47,21 @@ class Writer(Protocol):
 class _Lines:
     """One line a result: JSON, or the name of a frame, or the recording and start of an interval, that matches."""
 
-    def __init__(self, text: TextStream, line: Callable[[Mapping[str, Any]], str | None]) -> None:
+    def __init__(self, text: TextStream, line: Callable[[Record], str | None]) -> None:
         self._text, self._line = text, line
 
-    def write(self, record: Mapping[str, Any]) -> None:
+    def write(self, record: Record) -> None:
         line = self._line(record)
         if line is not None:
-            self._put(line)
-
-    def _put(self, line: str) -> None:
-        self._text.write(line + "\n")
-        self._text.flush()
+            self._text.write(line + "\n")
+            self._text.flush()
 
     def finish(self) -> None:
         self._text.flush()
 
 
-class _JsonLines(_Lines):
-    """One line of JSON a result."""
-
-    def __init__(self, text: TextStream) -> None:
-        super().__init__(text, lambda record: plain_json(json_text(record)))
-
-    def write_result(self, result: Result, more: Mapping[str, str]) -> None:
-        """Write a result of which nobody has the record."""
-        self._put(plain_json(json_line(result, more)))
-
-
-def _flat(record: Mapping[str, Any], names: tuple[str, ...]) -> dict[str, Any]:
-    """A row of plain cells; nested values and truth values become JSON text."""
-    cells = {name: record.get(name, {}) for name in names}
-    return {
-        name: plain_json(json_text(cell)) if isinstance(cell, Mapping | bool) else cell for name, cell in cells.items()
-    }
-
-
-def _name(record: Mapping[str, Any]) -> str | None:
-    if record["verdict"] != "match":
-        return None
-    name = record["frame"] if "frame" in record else f"{record['recording']}@{record['start_us']}"
-    return plain(name).replace("\n", "\\n")
+def _name(record: Record) -> str | None:
+    return plain(record.name).replace("\n", "\\n") if record.verdict == "match" else None
 
 
 class CsvRows:
@@ -136,15 +87,25 @@ class CsvRows:
 
 
 class _Csv:
+    """A row a result, with a column a field; nested values and truth values are JSON."""
+
     def __init__(self, text: TextStream, names: tuple[str, ...], *, spreadsheet: bool) -> None:
         self._text, self._names = text, names
         self._rows = CsvRows(text, names, spreadsheet=spreadsheet)
 
-    def write(self, record: Mapping[str, Any]) -> None:
-        row = _flat(record, self._names) | {
-            name: record.get(name) for name in (*DENSITY_COLUMNS, ORIGIN) if name in self._names
-        }
-        self._rows.write(row)
+    def write(self, record: Record) -> None:
+        cells = {name: getattr(record, name) for name in self._names}
+        cells["cause"] = cells["cause"] or {}
+        self._rows.write(
+            {
+                name: None
+                if cell is UNSET
+                else cell
+                if isinstance(cell, str | float | None) or type(cell) is int
+                else plain_json(json_text(cell))
+                for name, cell in cells.items()
+            }
+        )
         self._text.flush()
 
     def finish(self) -> None:
@@ -157,9 +118,9 @@ class _Parquet:
 
         self._schema = result_schema(roles, origin=origin, ranked=ranked, over_time=over_time)
         self._file = pq.ParquetWriter(sink, self._schema)
-        self._rows: list[Mapping[str, Any]] = []
+        self._rows: list[Record] = []
 
-    def write(self, record: Mapping[str, Any]) -> None:
+    def write(self, record: Record) -> None:
         self._rows.append(record)
         if len(self._rows) >= 10_000:
             self._spill()
@@ -194,7 +155,6 @@ def make_writer(
         ranked: Whether results have a density.
         over_time: Whether the results are intervals.
     """
-    names = _INTERVAL_COLUMNS if over_time else _COLUMNS
     if name == "parquet":
         return _Parquet(sink, roles(), origin, ranked=ranked, over_time=over_time)
     text = TextStream(sink)
@@ -202,22 +162,11 @@ def make_writer(
         case "table":
             return Table(text, shorten, over_time=over_time)
         case "csv" | "spreadsheet":
-            more = (*(DENSITY_COLUMNS if ranked else ()), *((ORIGIN,) if origin else ()))
-            return _Csv(text, (*names, *more), spreadsheet=name == "spreadsheet")
+            left_out = {*(() if ranked else DENSITY), *(() if origin else ("dataset",))}
+            kind = IntervalRecord if over_time else FrameRecord
+            names = tuple(name for name in kind.__struct_fields__ if name not in left_out)
+            return _Csv(text, names, spreadsheet=name == "spreadsheet")
         case "ids":
             return _Lines(text, _name)
         case _:
-            return _JsonLines(text)
-
-
-def result_writer(writer: Writer, origin: str) -> Callable[[Result], None]:
-    """What writes results of a dataset.
-
-    Args:
-        writer: The writer of a format.
-        origin: The dataset.
-    """
-    more = {ORIGIN: origin}
-    if isinstance(writer, _JsonLines):
-        return lambda result: writer.write_result(result, more)
-    return lambda result: writer.write(record(result) | more)
+            return _Lines(text, lambda record: plain_json(json_text(record)))

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import click
 
 from scenicq.exporters.forms import FORMS
 from scenicq.query.execution.partitions import Gathered
 from scenicq.query.execution.partitions import gather as find_pieces
-from scenicq.query.execution.record_reader import noted_question, read_record
-from scenicq.query.execution.result_origin import ORIGIN
+from scenicq.query.execution.question_notes import noted_question
+from scenicq.query.execution.records import IntervalRecord, read_record
 from scenicq.query.execution.result_tables import roles_of
 
 from .deliver import Wanted, deliver
@@ -65,8 +64,8 @@ def gather(ctx: click.Context, folder: Path, *, format_: str | None, output: Pat
 
 def _write(gathered: Gathered, file: Path | None, form: str) -> None:
     with destination(file) as sink, writing(file):
-        first = next(gathered.records(), dict[str, Any]())
-        origin, over_time = first.get(ORIGIN, ""), "frames" in first
+        first = next(gathered.records(), None)
+        origin, over_time = (first and first.dataset) or "", isinstance(first, IntervalRecord)
         writer = make_writer(form, sink, lambda: roles_of(gathered.records()), origin=origin, over_time=over_time)
         for each in gathered.records():
             writer.write(each)

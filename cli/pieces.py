@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import click
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.query.execution.partitions import gather, is_done, partitions, write_partition
-from scenicq.query.execution.record_reader import name_question, note_question
-from scenicq.query.execution.result_origin import ORIGIN, name_origin
-from scenicq.query.execution.results import Funnel, record
+from scenicq.query.execution.question_notes import name_question, note_question
+from scenicq.query.execution.records import Record, record
+from scenicq.query.execution.result_origin import name_origin
+from scenicq.query.execution.results import Funnel
 from scenicq.query.execution.run import Query
 
 from .output import ProgressBar
@@ -33,7 +33,7 @@ def parse_shard(_ctx: click.Context, _parameter: click.Parameter, text: str | No
     return int(left), int(right)
 
 
-def _whole(query: Query, shard: Shard, folder: Path, bar: ProgressBar) -> Iterator[dict[str, Any]]:
+def _whole(query: Query, shard: Shard, folder: Path, bar: ProgressBar) -> Iterator[Record]:
     """The records of a shard, all of them; what is asked is written once they are there, not by a run that is stopped.
 
     Raises:
@@ -41,7 +41,7 @@ def _whole(query: Query, shard: Shard, folder: Path, bar: ProgressBar) -> Iterat
     """
     origin = name_origin(query.dataset)
     for result in query.results(bar.advance):
-        yield record(result) | {ORIGIN: origin}
+        yield record(result, origin)
     if query.funnel.cut:
         number, count = shard
         message = f"shard {number}/{count} was not finished by the --deadline, and a shard is kept whole or not at all"

@@ -5,10 +5,12 @@ from __future__ import annotations
 import shutil
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
-from typing import IO, Any, BinaryIO, cast
+from typing import IO, BinaryIO, cast
 
 import click
+from msgspec import UNSET
 
+from scenicq.query.execution.records import CauseRecord, IntervalRecord, Record
 from scenicq.store.frame_names import ShortNames
 
 from .report import columns, moment, plain
@@ -69,7 +71,7 @@ class Table:
         self._short: ShortNames | None = None
         self._rows: list[Row] = []
 
-    def write(self, record: Mapping[str, Any]) -> None:
+    def write(self, record: Record) -> None:
         """Add a row."""
         self._rows.append(_cells(record))
         if len(self._rows) >= _BLOCK:
@@ -201,30 +203,27 @@ def _wrapped(table: Sequence[Sequence[str]], kept: list[int], width: int) -> lis
     return lines
 
 
-def _cells(record: Mapping[str, Any]) -> Row:
-    cause = record.get("cause", {})
-    near = cause.get("what") in ("tolerance", "program", "--min-duration")
-    density = record.get("log_density")
-    why = (
-        f"{density:.2f}" if density is not None else cause.get("reason") or cause.get("detail" if near else "what", "")
-    )
-    objects = [f"{role}={label}" for role, label in record["correspondence"].items() if (role, label) != ("ego", "ego")]
-    verdict = f"{record['verdict']}: {why}" if why else record["verdict"]
-    if "frames" in record:
-        frames = record["frames"]
+def _cells(record: Record) -> Row:
+    cause = record.cause or CauseRecord()
+    near = cause.what in ("tolerance", "program", "--min-duration")
+    density = None if record.log_density is UNSET else record.log_density
+    why = f"{density:.2f}" if density is not None else cause.reason or (cause.detail if near else cause.what)
+    objects = [f"{role}={label}" for role, label in record.correspondence.items() if (role, label) != ("ego", "ego")]
+    verdict = f"{record.verdict}: {why}" if why else record.verdict
+    if isinstance(record, IntervalRecord):
         return (
-            record["recording"],
-            moment(record["start_us"]),
-            f"{(record['end_us'] - record['start_us']) / 1e6:.1f}",
+            record.recording,
+            moment(record.start_us),
+            f"{(record.end_us - record.start_us) / 1e6:.1f}",
             verdict,
             " ".join(objects) or "-",
-            f"{frames['count']}{_FROM}{frames['first']}",
+            f"{record.frames.count}{_FROM}{record.frames.first}",
         )
-    sensors = sorted(record["sensors"].items(), key=lambda item: (not item[0].startswith("CAM_FRONT"), item))
+    sensors = sorted(record.sensors.items(), key=lambda item: (not item[0].startswith("CAM_FRONT"), item))
     return (
-        record["frame"],
-        record["recording"],
-        moment(record["timestamp_us"]),
+        record.frame,
+        record.recording,
+        moment(record.timestamp_us),
         verdict,
         " ".join(objects) or "-",
         sensors[0][1] if sensors else "-",

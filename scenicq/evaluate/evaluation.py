@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeAlias, cast
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -25,9 +26,10 @@ from scenicq.evaluate.slices import Slice, slices
 from scenicq.evaluate.weighting import Weighted, weighted
 from scenicq.importers.prediction_files import read_predictions
 from scenicq.importers.predictions import THRESHOLDS_M, Predictions
+from scenicq.query.execution.records import FrameRecord, IntervalRecord, Record, record, record_of
 from scenicq.query.execution.result_files import read_records
-from scenicq.query.execution.result_origin import ORIGIN, check_origins, name_origin
-from scenicq.query.execution.results import Result, record
+from scenicq.query.execution.result_origin import check_origins, name_origin
+from scenicq.query.execution.results import Result
 from scenicq.store.dataset import Dataset
 
 __all__ = ["Evaluation", "ScenarioEvaluation", "WorstFrame", "evaluate"]
@@ -35,8 +37,8 @@ __all__ = ["Evaluation", "ScenarioEvaluation", "WorstFrame", "evaluate"]
 Bools = NDArray[np.bool_]
 Reals = NDArray[np.float64]
 
-Results: TypeAlias = Path | str | Iterable[Result | Mapping[str, Any]]
-"""A file of results, results as a query gives them, or records of them."""
+Results: TypeAlias = Path | str | Iterable[Result | Record | Mapping[str, Any]]
+"""A file of results, results as a query gives them, or records of them, which may be plain values."""
 
 _WORST = 50
 
@@ -191,24 +193,31 @@ def _name_of(results: Results) -> str:
     return Path(results).stem if isinstance(results, Path | str) else "results"
 
 
-def _records(results: Results) -> Iterator[Mapping[str, Any]]:
+def _records(results: Results) -> Iterator[Record]:
     if isinstance(results, Path | str):
         yield from read_records(Path(results))
-    else:
-        for each in results:
-            yield record(each) if isinstance(each, Result) else each
+        return
+    for number, each in enumerate(results, 1):
+        if isinstance(each, Result):
+            yield record(each)
+        elif isinstance(each, FrameRecord | IntervalRecord):
+            yield each
+        else:
+            try:
+                yield record_of(each)
+            except msgspec.ValidationError as error:
+                raise DataError(Diagnostic("file-invalid", f"result {number} is no result: {error}")) from None
 
 
-def _own(
-    name: str, records: Iterable[Mapping[str, Any]], dataset: Dataset, doubts: list[Diagnostic]
-) -> Iterator[Mapping[str, Any]]:
+def _own(name: str, records: Iterable[Record], dataset: Dataset, doubts: list[Diagnostic]) -> Iterator[Record]:
     """The records, once it is sure that they do not name another dataset; another version of it is a doubt."""
-    mine = {ORIGIN: name_origin(dataset)}
-    seen: set[Any] = set()
+    mine = name_origin(dataset)
+    seen: set[str] = set()
     for each in records:
-        if each.get(ORIGIN) not in seen:
-            seen.add(each.get(ORIGIN))
-            doubt = check_origins((f"{name} (results)", [each]), (dataset.name, [mine]))
+        origin = each.dataset or ""
+        if origin not in seen:
+            seen.add(origin)
+            doubt = check_origins((f"{name} (results)", [origin]), (dataset.name, [mine]))
             doubts += [] if doubt is None else [doubt]
         yield each
 

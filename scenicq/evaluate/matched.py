@@ -8,10 +8,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from msgspec import UNSET
 from numpy.typing import NDArray
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.evaluate.annotations import Annotations, Frames
+from scenicq.query.execution.records import FrameRecord, Record
 
 __all__ = ["Matched", "Played", "read_matched"]
 
@@ -57,7 +59,7 @@ class Matched:
     log_weight: NDArray[np.float64] | None = None
 
 
-def read_matched(name: str, records: Iterable[Mapping[str, Any]], frames: Frames, objects: Annotations) -> Matched:
+def read_matched(name: str, records: Iterable[Record], frames: Frames, objects: Annotations) -> Matched:
     """Divide the frames of a dataset by the results of a query.
 
     Frames that the results do not name count as decided: a query names what matches and what is unknown.
@@ -80,22 +82,21 @@ def read_matched(name: str, records: Iterable[Mapping[str, Any]], frames: Frames
     ranked = False
     recordings = {recording: number for number, recording in enumerate(frames.recordings)}
     for each in records:
-        verdict = each.get("verdict")
-        if verdict not in ("match", "unknown"):
+        if each.verdict == "no_match":
             continue
         where = _frames_of(name, each, frames, recordings)
-        if verdict == "unknown":
+        if each.verdict == "unknown":
             unknown[where] = True
             continue
         matching[where] = True
-        known = _known(each, "witness")
-        if "log_weight" in each:
+        if each.log_weight is not UNSET:
             ranked = True
-            log_weight[where] = _log_weight(name, each["log_weight"])
-        names = objects.ids if "frame" in each else objects.tracks
-        roles = {role: its for role, its in _known(each, "correspondence").items() if its != _EGO}
+            log_weight[where] = _log_weight(name, each.log_weight)
+        of_frame = isinstance(each, FrameRecord)
+        names = objects.ids if of_frame else objects.tracks
+        roles = {role: its for role, its in each.correspondence.items() if its != _EGO}
         for frame in where:
-            witness.setdefault(frame, known)
+            witness.setdefault(frame, each.witness)
             first, count = int(starts[frame]), int(starts[frame + 1] - starts[frame])
             own: list[str] = names.slice(first, count).to_pylist()
             # the first of those that share a name
@@ -103,7 +104,7 @@ def read_matched(name: str, records: Iterable[Mapping[str, Any]], frames: Frames
             for role, its in roles.items():
                 if its in here:
                     played.setdefault(role, {})[here[its]] = None
-                elif "frame" in each:
+                elif of_frame:
                     raise _lacking(name, f"`{its}` in frame {frames.names[frame]}")
     return Matched(
         name=name,
@@ -115,37 +116,26 @@ def read_matched(name: str, records: Iterable[Mapping[str, Any]], frames: Frames
     )
 
 
-def _log_weight(name: str, told: Any) -> float:
-    """A weight that results say; text where they are CSV, nan where it is not known."""
-    try:
-        value = math.nan if told in (None, "") else float(told)
-    except (TypeError, ValueError):
-        value = math.inf
-    if abs(value) > _LARGEST:
+def _log_weight(name: str, told: float | None) -> float:
+    """A weight that results say, nan where it is not known."""
+    if told is None:
+        return math.nan
+    if not abs(told) <= _LARGEST:
         raise DataError(Diagnostic("file-invalid", f"results of {name}: {told!r} is no `log_weight`"))
-    return value
+    return told
 
 
-def _known(each: Mapping[str, Any], name: str) -> dict[str, Any]:
-    """What a result says under a name, without what is null."""
-    told: Mapping[str, Any] = each.get(name) or {}
-    return {key: value for key, value in told.items() if value is not None}
-
-
-def _frames_of(name: str, each: Mapping[str, Any], frames: Frames, recordings: Mapping[str, int]) -> list[int]:
-    if "frame" in each:
-        number = frames.numbers.get(each["frame"])
+def _frames_of(name: str, each: Record, frames: Frames, recordings: Mapping[str, int]) -> list[int]:
+    if isinstance(each, FrameRecord):
+        number = frames.numbers.get(each.frame)
         if number is None:
-            raise _lacking(name, f"frame {each['frame']}")
+            raise _lacking(name, f"frame {each.frame}")
         return [number]
-    recording = recordings.get(each.get("recording", ""))
+    recording = recordings.get(each.recording)
     if recording is None:
-        raise _lacking(name, f"recording {each.get('recording')}")
-    start, end = each.get("start_us"), each.get("end_us")
-    if not isinstance(start, int) or not isinstance(end, int):
-        message = f"results of {name}: an interval of {each['recording']} lacks `start_us` or `end_us`"
-        raise DataError(Diagnostic("file-invalid", message))
-    inside = (frames.recording == recording) & (frames.timestamp_us >= start) & (frames.timestamp_us <= end)
+        raise _lacking(name, f"recording {each.recording}")
+    inside = frames.recording == recording
+    inside &= (frames.timestamp_us >= each.start_us) & (frames.timestamp_us <= each.end_us)
     return np.flatnonzero(inside).tolist()
 
 

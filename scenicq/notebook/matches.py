@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from html import escape
@@ -22,11 +23,13 @@ from scenicq.notebook.judgements import Judgement
 from scenicq.notebook.pictures import SCROLLS, DisplayedText, Picture, take_picture
 from scenicq.option_values import SCORE, SEED, Choice, read_option
 from scenicq.query.execution.lazy_solver import LazySolver
-from scenicq.query.execution.result_origin import ORIGIN, name_origin
+from scenicq.query.execution.records import json_text, record
+from scenicq.query.execution.result_origin import name_origin
 from scenicq.query.execution.result_tables import result_schema, result_table
-from scenicq.query.execution.results import Funnel, Result, record
+from scenicq.query.execution.results import Funnel, Result
 from scenicq.query.execution.run import Query
 from scenicq.query.explain.frame_explanation import explain, show_explanation
+from scenicq.query.explain.interval_explanation import explain_recording
 from scenicq.report.backdrop import Backdrop
 from scenicq.report.picture import LETTERS, Shot, draw
 from scenicq.report.write import write_report
@@ -55,16 +58,18 @@ class _Origin:
 
 @dataclass(frozen=True, slots=True, repr=False)
 class FrameResult(_Origin):
-    """The verdict on one frame, as plain values: `dataclasses.asdict`, pandas and Polars take it as it is.
+    """The verdict on one frame or interval, as plain values: `dataclasses.asdict`, pandas and Polars take it as it is.
 
     Attributes:
-        frame: Name of the frame.
+        frame: Name of the frame, of an interval the first.
         recording: Name of the recording.
         timestamp_us: When, in microseconds.
         verdict: `match`, `no_match` or `unknown`.
-        roles: The label object of each object of the program.
+        roles: The label object of each object of the program; the track of an interval.
         witness: A value of each random variable that proves a match, by its place in the program.
-        sensors: The sensor file of each channel.
+        sensors: The sensor file of each channel; none of an interval.
+        end_us: When the interval ends; of a frame its time.
+        frames: How many frames it has; 1 of a frame.
     """
 
     frame: str
@@ -74,6 +79,8 @@ class FrameResult(_Origin):
     roles: Mapping[str, str]
     witness: Mapping[str, Any]
     sensors: Mapping[str, str]
+    end_us: int
+    frames: int
 
     @staticmethod
     def of(matches: Matches, result: Result) -> FrameResult:
@@ -83,10 +90,10 @@ class FrameResult(_Origin):
             matches: The query that it came out of.
             result: Frame, verdict and sensor files.
         """
-        told = record(result)
+        told, span = record(result), result.interval
         made = FrameResult(
-            result.frame, result.recording, result.timestamp_us, told["verdict"], dict(told["correspondence"]),
-            dict(told["witness"]), dict(told.get("sensors", {})),
+            result.frame, result.recording, result.timestamp_us, told.verdict, told.correspondence, told.witness,
+            dict(result.sensors), *((result.timestamp_us, 1) if span is None else (span.end_us, span.count)),
         )  # fmt: skip
         object.__setattr__(made, "matches", matches)
         object.__setattr__(made, "result", result)
@@ -103,11 +110,15 @@ class FrameResult(_Origin):
     @property
     def record(self) -> Mapping[str, Any]:
         """The values that a line of `scenicq match --format jsonl` has."""
-        return record(self.result) | {ORIGIN: self.matches.origin}
+        return json.loads(json_text(record(self.result, self.matches.origin)))
 
     def explain(self) -> DisplayedText:
-        """Why the frame matches, or what keeps it from it."""
-        return self.matches.explain(self.frame)
+        """Why the frame or interval matches, or what keeps it from it."""
+        if self.result.interval is None:
+            return self.matches.explain(self.frame)
+        query = self.matches.query
+        with LazySolver(query.options.solver) as solver:
+            return DisplayedText(explain_recording(query, solver, self.recording, self.timestamp_us).text())
 
     def show(self, *, half: float | None = None, width: int = 600) -> Picture:
         """The frame from above, with what the program says of it."""
@@ -215,8 +226,8 @@ class Matches(Sequence[FrameResult]):
 
     def to_arrow(self) -> pa.Table:
         """The results as an Arrow table with a field a role, as `-o FILE.parquet` has it."""
-        schema = result_schema(self.query.roles(), origin=self.origin)
-        return result_table((each.record for each in self._all()), schema)
+        schema = result_schema(self.query.roles(), origin=self.origin, over_time=self.query.is_over_time())
+        return result_table((record(each.result) for each in self._all()), schema)
 
     def to_pandas(self) -> Any:
         """The results as a data frame; pandas is to be installed."""

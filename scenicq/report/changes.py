@@ -6,10 +6,10 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
-from typing import Literal, cast
+from typing import Literal
 
 from scenicq.errors import DataError, Diagnostic
-from scenicq.query.execution.result_files import Record
+from scenicq.query.execution.records import CauseRecord, FrameRecord, IntervalRecord, Record
 from scenicq.query.execution.result_origin import check_origins
 from scenicq.report.frames import table
 from scenicq.report.page import page
@@ -21,7 +21,7 @@ Kind = Literal["came", "went", "recast", "stayed"]
 _TOLD: dict[Kind, str] = {
     "came": "match in B only",
     "went": "match in A only",
-    "recast": "match in both, with other objects",
+    "recast": "match in both, with other objects or another end",
     "stayed": "match in both, with the same objects",
 }
 _MARKS: dict[Kind, str] = {"came": "+", "went": "-", "recast": "~", "stayed": "="}
@@ -29,13 +29,14 @@ _MARKS: dict[Kind, str] = {"came": "+", "went": "-", "recast": "~", "stayed": "=
 
 @dataclass(frozen=True, slots=True)
 class FrameChange:
-    """What became of one frame that matches in either file.
+    """What became of one frame, or one interval, that matches in either file.
 
     Attributes:
         kind: What became of it.
-        frame, recording: Which frame.
+        frame, recording: Which frame; an interval is called by its recording and where it starts.
         before, after: Label object of each role in A and in B, where it matches there.
-        why: What the file in which it does not match says of it, if anything.
+        why: What the file in which it does not match says of it, if anything; of an interval that matches in both
+            where it ends, if that differs.
     """
 
     kind: Kind
@@ -47,42 +48,46 @@ class FrameChange:
 
 
 def _played(record: Record | None) -> dict[str, str] | None:
-    if record is None or record["verdict"] != "match":
-        return None
-    given = record.get("correspondence")
-    roles = cast("dict[object, object]", given) if isinstance(given, dict) else {}
-    return {str(role): str(played) for role, played in roles.items()}
+    return None if record is None or record.verdict != "match" else record.correspondence
 
 
 def _why(record: Record | None) -> str:
     if record is None:
         return ""
-    given = record.get("cause")
-    cause: Record = cast(Record, given) if isinstance(given, dict) else {}
-    parts = [record["verdict"].replace("_", " ")]
-    parts += [str(cause[key]) for key in ("reason", "what", "detail") if cause.get(key)]
-    return ": ".join((parts[0], ", ".join(parts[1:]))) if parts[1:] else parts[0]
+    cause = record.cause or CauseRecord()
+    verdict, *told = record.verdict.replace("_", " "), cause.reason, cause.what, cause.detail
+    return ": ".join(filter(None, (verdict, ", ".join(filter(None, told)))))
+
+
+def _start_us(record: Record) -> int:
+    return record.timestamp_us if isinstance(record, FrameRecord) else record.start_us
+
+
+def _moved(old: Record | None, new: Record | None) -> str:
+    if isinstance(old, IntervalRecord) and isinstance(new, IntervalRecord) and old.end_us != new.end_us:
+        return f"ends at {new.end_us}, in A at {old.end_us}"
+    return ""
 
 
 def changes(before: Mapping[str, Record], after: Mapping[str, Record]) -> list[FrameChange]:
-    """What became of each frame that matches in either, by recording, then time.
+    """What became of each frame or interval that matches in either, by recording, then time.
 
     Args:
-        before: Records of the first file by frame.
+        before: Records of the first file by frame, or by recording and start.
         after: Records of the second.
     """
     found: list[tuple[tuple[str, int, str], FrameChange]] = []
     for frame in before.keys() | after.keys():
         old, new = before.get(frame), after.get(frame)
         was, is_ = _played(old), _played(new)
-        if was is None and is_ is None:
+        shown = new if is_ is not None else old if was is not None else None
+        if shown is None:
             continue
-        record = cast(Record, new if is_ is not None else old)
-        kind: Kind = "came" if was is None else "went" if is_ is None else "stayed" if was == is_ else "recast"
-        why = _why(old if was is None else new if is_ is None else None)
-        change = FrameChange(kind, frame, record["recording"], was or {}, is_ or {}, why)
-        time = record.get("timestamp_us")
-        found.append(((record["recording"], time if isinstance(time, int) else 0, frame), change))
+        why = _why(old if was is None else new if is_ is None else None) or _moved(old, new)
+        same = was == is_ and not why
+        kind: Kind = "came" if was is None else "went" if is_ is None else "stayed" if same else "recast"
+        change = FrameChange(kind, frame, shown.recording, was or {}, is_ or {}, why)
+        found.append(((shown.recording, _start_us(shown), frame), change))
     return [change for _, change in sorted(found, key=lambda each: each[0])]
 
 
@@ -98,11 +103,16 @@ def check_datasets(before: Mapping[str, Record], after: Mapping[str, Record]) ->
         and names no dataset; None where all is well.
 
     Raises:
-        DataError: option-invalid, where the names differ, or a frame of both has another recording or time.
+        DataError: option-invalid, where the names differ, a frame of both has another recording or time, or one
+            file holds frames and the other intervals.
     """
-    doubt = check_origins(("A", before.values()), ("B", after.values()))
+    kinds = [{type(each) for each in records.values()} for records in (before, after)]
+    if len(kinds[0] | kinds[1]) > 1:
+        raise DataError(Diagnostic("option-invalid", "results that are frames are not comparable with intervals"))
+    origins = ([each.dataset or "" for each in records.values()] for records in (before, after))
+    doubt = check_origins(*zip("AB", origins, strict=True))
     for frame in sorted(before.keys() & after.keys()):
-        old, new = ((each["recording"], each.get("timestamp_us")) for each in (before[frame], after[frame]))
+        old, new = ((each.recording, _start_us(each)) for each in (before[frame], after[frame]))
         if old != new:
             message = f"the files are of different datasets: frame `{frame}` is of {old[0]} at {old[1]} in A, of "
             message += f"{new[0]} at {new[1]} in B"
@@ -110,7 +120,7 @@ def check_datasets(before: Mapping[str, Record], after: Mapping[str, Record]) ->
     if bool(before) != bool(after):
         message = f"{'B' if before else 'A'} holds no results: nothing says of which dataset it is"
         return Diagnostic("option-invalid", message, severity="warning")
-    recordings = [{each["recording"] for each in records.values()} for records in (before, after)]
+    recordings = [{each.recording for each in records.values()} for records in (before, after)]
     if doubt is None and before and after and recordings[0].isdisjoint(recordings[1]):
         message = "the files have no recording in common: they may be of different datasets"
         return Diagnostic("option-invalid", message, severity="warning")
@@ -122,13 +132,13 @@ def _cast(roles: Mapping[str, str]) -> str:
 
 
 def _objects(change: FrameChange) -> str:
-    if change.kind == "recast":
+    if change.kind == "recast" and change.before != change.after:
         return f"{_cast(change.before)} -> {_cast(change.after)}"
     return _cast(change.after or change.before)
 
 
 def _elsewhere(change: FrameChange) -> str:
-    """What the file in which the frame does not match says of it."""
+    """What the file in which the frame does not match says of it, or B of an interval that matches in both."""
     return change.why and f"in {'A' if change.kind == 'came' else 'B'} {change.why}"
 
 

@@ -26,7 +26,7 @@ from scenicq.errors import Source
 from scenicq.garbage import seldom_collected
 from scenicq.match.options import MatchOptions
 from scenicq.match.verdict import Match
-from scenicq.query.execution.result_lines import json_line
+from scenicq.query.execution.records import json_text, record
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.dataset import Dataset, open_dataset
 
@@ -63,7 +63,7 @@ def ours(dataset: Dataset, text: str, options: MatchOptions, *, witnesses: bool)
         if isinstance(result.verdict, Match):
             found.add(result.frame)
             if witnesses:
-                json_line(result)  # as the command writes it
+                json_text(record(result))  # as the command writes it
     return time.process_time() - started, found
 
 

@@ -10,6 +10,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from scenicq.forest.scenario import BuiltIn
+from scenicq.query.execution.records import json_text
 from scenicq.query.execution.result_tables import read_row
 from scenicq.query.execution.run import Query
 
@@ -127,7 +128,7 @@ def test_a_file_s_extension_says_its_format(run, crossroads, crossing, tmp_path)
     assert table.column("correspondence").to_pylist() == [line["correspondence"] for line in lines]
     (origin,) = {line.pop("dataset") for line in lines}
     assert table.schema.metadata[b"scenicq.dataset"].decode() == origin
-    assert [read_row(row) for row in table.to_pylist()] == lines
+    assert [json.loads(json_text(read_row(row))) for row in table.to_pylist()] == lines
     cells = csv.DictReader(io.StringIO((tmp_path / "a.csv").read_text()))
     assert {row["dataset"] for row in cells} == {origin}
     assert re.fullmatch("crossroads@[0-9a-f]{8}", origin)

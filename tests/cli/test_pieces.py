@@ -10,8 +10,7 @@ import pytest
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import EXACT
 from scenicq.query.execution.program_files import read_program
-from scenicq.query.execution.record_reader import read_record
-from scenicq.query.execution.results import record
+from scenicq.query.execution.records import decode_record, json_text, read_record, record
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.dataset import open_dataset
 
@@ -131,7 +130,7 @@ def test_records_come_back_as_they_were(run, scenarios, crossroads):
     ):
         records = [record(result) for result in Query(open_dataset(crossroads), source, options).results()]
         assert records
-        assert [record(read_record(json.loads(json.dumps(each)), source)) for each in records] == records
+        assert [record(read_record(decode_record(json_text(each)), source)) for each in records] == records
 
 
 def test_an_engine_that_is_unknown_is_a_usage_error(run, program, crossroads, tmp_path):

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from msgspec import structs
 from shapely.geometry import Polygon
 
 from scenicq.errors import DataError
@@ -27,8 +28,9 @@ from scenicq.importers.motion import euler
 from scenicq.importers.prediction_files import read_predictions
 from scenicq.importers.predictions import ARGOVERSE2, NUSCENES, Predictions
 from scenicq.query.execution.program_files import read_program
+from scenicq.query.execution.records import Record, record
 from scenicq.query.execution.result_origin import name_origin
-from scenicq.query.execution.results import Result, record
+from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query
 from scenicq.store.dataset import Dataset, open_dataset
 from scenicq.store.labels import Label, LabelObject, OutOfPlane, Recording
@@ -158,7 +160,8 @@ def test_intervals_of_recordings_are_results(street: Dataset, results: list[Resu
         times.setdefault(each.recording, []).append(each.timestamp_us)
     records = [
         {"recording": name, "start_us": min(mine), "end_us": max(mine), "verdict": "match", "witness": {},
-         "correspondence": {"ego": "ego", "parkedCar": "parked"}, "frames": {"count": len(mine)}}
+         "correspondence": {"ego": "ego", "parkedCar": "parked"},
+         "frames": {"first": "a", "last": "b", "count": len(mine)}}
         for name, mine in times.items()
     ]  # fmt: skip
     by_frame = evaluate({"a": results}, street, predictions).scenarios[0]
@@ -169,7 +172,7 @@ def test_intervals_of_recordings_are_results(street: Dataset, results: list[Resu
 
 def test_unknown_frames_are_in_neither_group(street: Dataset, results: list[Result], predictions: Predictions) -> None:
     records = [record(each) for each in results]
-    records[0] = {**records[0], "verdict": "unknown"}
+    records[0] = structs.replace(records[0], verdict="unknown")
     found = evaluate({"a": records}, street, predictions).scenarios[0]
     assert found.matching == len(results) - 1
     assert found.matching + found.other == street.manifest.total.frames - 1
@@ -256,16 +259,18 @@ def test_what_does_not_fit_is_told(street: Dataset, results: list[Result], predi
     refused("predictions-frame", run(replace(predictions, x=predictions.x + 5000)))
     refused("unknown-class", run(replace(predictions, classes=["Car", "spaceship"])))
     refused("option-invalid", run(predictions, distance_m=3.0))
-    refused("file-invalid", lambda: evaluate([{**record(results[0]), "frame": "other"}], street, predictions))
-    cast = {"correspondence": {"parkedCar": "nobody"}}
-    refused("file-invalid", lambda: evaluate([{**record(results[0]), **cast}], street, predictions))
+    refused("file-invalid", lambda: evaluate([structs.replace(record(results[0]), frame="other")], street, predictions))
+    nobody = structs.replace(record(results[0]), correspondence={"parkedCar": "nobody"})
+    refused("file-invalid", lambda: evaluate([nobody], street, predictions))
+    strange = {"frame": "a", "recording": "r", "verdict": 3}
+    assert "`$.verdict`" in refused("file-invalid", lambda: evaluate([strange], street, predictions))
 
 
 def test_results_say_which_dataset_they_are_of(
     street: Dataset, results: list[Result], predictions: Predictions
 ) -> None:
-    def of(dataset: str) -> list[dict[str, Any]]:
-        return [record(each) | {"dataset": dataset} for each in results]
+    def of(dataset: str) -> list[Record]:
+        return [record(each, dataset) for each in results]
 
     mine = name_origin(street)
     assert evaluation_record(evaluate(of(mine), street, predictions))["dataset"] == mine

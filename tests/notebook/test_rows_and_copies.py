@@ -2,12 +2,15 @@
 
 import copy
 import dataclasses
+import json
 import os
 import pickle
 
 import pytest
 
 import scenicq
+from scenicq.query.execution.records import json_text
+from scenicq.query.execution.result_tables import read_row
 from scenicq.store.read_lock import Reading, nobody_reads
 
 PROGRAM = "ego = new Car; new Car"
@@ -24,8 +27,9 @@ def test_a_result_is_a_plain_row(matches):
     row = dataclasses.asdict(matches[0])
     told = matches[0].record
     assert row["roles"] == told["correspondence"]
-    assert {name: row[name] for name in ("frame", "recording", "timestamp_us", "verdict", "witness")} == {
-        name: told[name] for name in ("frame", "recording", "timestamp_us", "verdict", "witness")
+    assert json.loads(json.dumps(row["witness"])) == told["witness"]
+    assert {name: row[name] for name in ("frame", "recording", "timestamp_us", "verdict")} == {
+        name: told[name] for name in ("frame", "recording", "timestamp_us", "verdict")
     }
     assert dataclasses.astuple(matches[0])[0] == told["frame"]
 
@@ -88,3 +92,16 @@ def test_a_copy_reads_under_a_lock_of_its_own(tmp_path):
     other.end()
     with nobody_reads(tmp_path) as free:
         assert free
+
+
+def test_intervals_are_rows_and_tables_too(crossroads, run, scenarios):
+    program = scenarios.parent / "over_time" / "02_cut_in.scenic"
+    found = scenicq.open(crossroads).match(program)
+    lines = [json.loads(line) for line in run("match", program, crossroads, "--format", "jsonl").stdout.splitlines()]
+    assert [each.record for each in found] == lines
+    assert [(each.frame, each.timestamp_us, each.end_us, each.frames) for each in found] == [
+        (line["frames"]["first"], line["start_us"], line["end_us"], line["frames"]["count"]) for line in lines
+    ]
+    assert [json.loads(json_text(read_row(row, lines[0]["dataset"]))) for row in found.to_arrow().to_pylist()] == lines
+    told = run("explain", program, crossroads, f"{lines[0]['recording']}@{lines[0]['start_us']}").stdout
+    assert str(found[0].explain()).strip() == told.strip()

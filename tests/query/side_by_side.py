@@ -15,7 +15,8 @@ from scenicq.errors import ScenicqError
 from scenicq.match.matcher import Matcher
 from scenicq.match.verdict import Match, NoMatch, Unknown
 from scenicq.query.execution.block_matcher import CompiledMap, every_label
-from scenicq.query.execution.results import Result, record
+from scenicq.query.execution.records import record
+from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query
 from scenicq.query.prefilter.executor import Block, blocks, extents, run_prefilter
 from scenicq.query.prefilter.survivors import Candidate, candidates

@@ -16,7 +16,7 @@ from scenicq.errors import ScenicqError, Source
 from scenicq.importers.ingest import ingest
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import Tolerance
-from scenicq.query.execution.results import record
+from scenicq.query.execution.records import record
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.dataset import Dataset, open_dataset
 
@@ -86,7 +86,7 @@ def query(
 def named(dataset: Dataset, program: Example, options: MatchOptions) -> dict[str, str]:
     """The verdict on each frame that is not excluded, where nobody reads proofs."""
     results = query(dataset, program, options, prefilter=True, proofs=False).results()
-    return {result.frame: str(record(result)["verdict"]) for result in results}
+    return {result.frame: record(result).verdict for result in results}
 
 
 def found(dataset: Dataset, program: Example, options: MatchOptions, *, prefilter: bool) -> dict[str, object] | str:

@@ -3,8 +3,10 @@
 import json
 
 import pytest
+from msgspec import structs
 
 from scenicq.errors import DataError
+from scenicq.query.execution.records import json_text, record_of
 from scenicq.query.execution.result_files import read_results
 from scenicq.report.changes import changes, changes_page, changes_text, check_datasets
 
@@ -81,7 +83,7 @@ def test_every_format_of_match_is_read(run, crossroads, scenarios, tmp_path, kin
     assert lines.keys() == cells.keys()
     for frame, record in lines.items():
         for key in ("recording", "timestamp_us", "verdict", "correspondence"):
-            assert cells[frame][key] == record[key]
+            assert getattr(cells[frame], key) == getattr(record, key)
     found = changes(lines, cells)
     assert {each.kind for each in found} == {"stayed"}
     assert [each.frame for each in found] == [each.frame for each in changes(lines, lines)]
@@ -113,7 +115,7 @@ def test_missing_files_are_told(tmp_path):
 
 def test_results_of_different_datasets_are_refused():
     def of(*records):
-        return {each["frame"]: each for each in records}
+        return {each["frame"]: record_of(each) for each in records}
 
     mine = of(_line("a", time=1), _line("b", time=2))
     assert check_datasets(mine, of(_line("a", time=1))) is None
@@ -148,7 +150,7 @@ def test_every_format_names_its_dataset(run, crossroads, scenarios, tmp_path, ki
     assert run("match", scenarios / "02_crossing_cars.scenic", crossroads, "-o", file).exit_code == 0
     other = tmp_path / "b.jsonl"
     frame = next(iter(read_results(file).values()))
-    other.write_text(json.dumps({**frame, "dataset": "elsewhere@00000000"}) + "\n")
+    other.write_text(json_text(structs.replace(frame, dataset="elsewhere@00000000")) + "\n")
     done = run("report", file, other)
     assert (done.exit_code, done.stdout) == (2, "")
     assert "different datasets: A is of crossroads" in done.stderr
@@ -162,3 +164,25 @@ def test_the_command_refuses_them(run, tmp_path):
     done = run("report", *paths)
     assert (done.exit_code, done.stdout) == (2, "")
     assert "different datasets" in done.stderr
+
+
+def test_intervals_are_compared_by_where_they_start(run, tmp_path):
+    def interval(recording, start, end, roles):
+        frames = {"first": "a", "last": "b", "count": 2}
+        return {"recording": recording, "start_us": start, "end_us": end, "frames": frames, "verdict": "match",
+                "correspondence": roles}  # fmt: skip
+
+    same, other = {"ego": "ego", "car": "t"}, {"ego": "ego", "car": "u"}
+    before = [interval(name, 1, 5, same) for name in "pqrs"]
+    after = [interval("p", 1, 5, same), interval("q", 1, 7, same), interval("r", 1, 5, other)]
+    after.append(interval("s", 2, 5, same))
+    for name, records in (("a", before), ("b", after)):
+        (tmp_path / f"{name}.jsonl").write_text("".join(json.dumps(each) + "\n" for each in records))
+    done = run("report", tmp_path / "a.jsonl", tmp_path / "b.jsonl", "--all")
+    assert done.exit_code == 0
+    for line in ("= p@1  car=t", "~ q@1  car=t; in B ends at 7, in A at 5", "~ r@1  car=t -> car=u", "- s@1  car=t",
+                 "+ s@2  car=t"):  # fmt: skip
+        assert line in done.stdout
+    (tmp_path / "c.jsonl").write_text(json.dumps(_line("f")) + "\n")
+    refused = run("report", tmp_path / "a.jsonl", tmp_path / "c.jsonl")
+    assert (refused.exit_code, "not comparable with intervals" in refused.stderr) == (2, True)

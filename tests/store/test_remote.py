@@ -15,7 +15,7 @@ from scenicq.errors import DataError
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import parse_tolerance
 from scenicq.query.execution.program_files import read_program
-from scenicq.query.execution.results import record
+from scenicq.query.execution.records import record
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store import remote
 from scenicq.store.dataset import Dataset, open_dataset

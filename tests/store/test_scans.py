@@ -20,7 +20,7 @@ import scenicq
 from scenicq.errors import Source
 from scenicq.importers.ingest import ingest
 from scenicq.query.execution.interval_frames import frames_of
-from scenicq.query.execution.results import record
+from scenicq.query.execution.records import record
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.dataset import open_dataset
 from scenicq.store.observed_motion import observed_motion

@@ -15,9 +15,12 @@ from dataclasses import asdict, dataclass
 from itertools import groupby, pairwise
 from operator import itemgetter
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
+
+import msgspec
 
 from scenicq.errors import DataError, Diagnostic
+from scenicq.query.execution.records import Record, decode_record, json_text
 from scenicq.query.execution.results import Funnel
 from scenicq.query.execution.run import QueryOptions, RecordingRange
 from scenicq.store.atomic_files import made_folder, whole_file
@@ -94,16 +97,14 @@ def is_done(folder: Path, question: str, number: int, count: int) -> bool:
     return _file(folder, question, number, count).exists()
 
 
-def write_partition(
-    folder: Path, question: str, piece: Partition, records: Iterable[Mapping[str, Any]], funnel: Funnel
-) -> Path:
+def write_partition(folder: Path, question: str, piece: Partition, records: Iterable[Record], funnel: Funnel) -> Path:
     """Write a finished piece: one line a record, the funnel last.
 
     Args:
         folder: Where the pieces are; made if need be.
         question: Its `fingerprint`.
         piece: Which piece.
-        records: Its results as plain values, in order.
+        records: Its results, in order.
         funnel: Its counts, complete once the records are taken.
 
     Raises:
@@ -113,7 +114,7 @@ def write_partition(
     try:
         with made_folder(folder), whole_file(target) as file:
             for each in records:
-                file.write((json.dumps(each, ensure_ascii=False) + "\n").encode())
+                file.write((json_text(each) + "\n").encode())
             counts = {name: getattr(funnel, name) for name in _COUNTS}
             file.write((json.dumps({"funnel": counts}) + "\n").encode())
     except OSError as error:
@@ -138,21 +139,20 @@ class Gathered:
     files: tuple[Path, ...]
     funnel: Funnel
 
-    def records(self) -> Iterator[dict[str, Any]]:
+    def records(self) -> Iterator[Record]:
         """The results in the order of the dataset, one piece in memory at a time."""
         for path in self.files:
-            yield from _lines(path)[:-1]
+            yield from _piece(path)[0]
 
 
-def _lines(path: Path) -> list[dict[str, Any]]:
+def _piece(path: Path) -> tuple[list[Record], Mapping[str, Any]]:
+    """The results in a file, and what was counted."""
     try:
-        lines = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
-    except (OSError, ValueError):
-        lines = []
-    if not lines or "funnel" not in lines[-1]:
+        *lines, last = path.read_bytes().splitlines() or [b""]
+        return [decode_record(line) for line in lines], json.loads(last)["funnel"]
+    except (OSError, ValueError, KeyError, TypeError, msgspec.DecodeError):
         raise DataError(Diagnostic("store-damaged", f"{path} is not a complete piece of a result",
-                                   hints=("delete it and run its shard again",)))  # fmt: skip
-    return cast("list[dict[str, Any]]", lines)
+                                   hints=("delete it and run its shard again",))) from None  # fmt: skip
 
 
 def gather(folder: Path, question: str | None = None, *, only: int | None = None) -> Gathered:
@@ -185,7 +185,7 @@ def gather(folder: Path, question: str | None = None, *, only: int | None = None
                                    hints=("run their shards again",)))  # fmt: skip
     total = Funnel()
     for path in found:
-        _add(total, _lines(path)[-1]["funnel"])
+        _add(total, _piece(path)[1])
     return Gathered(chosen, tuple(found), total)
 
 

@@ -8,45 +8,41 @@ from __future__ import annotations
 
 import csv
 import io
-import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
+import msgspec
 import pyarrow as pa
 import pyarrow.parquet as pq
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.query.execution.csv_cells import unquote_cell
-from scenicq.query.execution.result_origin import METADATA, ORIGIN
-from scenicq.query.execution.result_tables import read_row
+from scenicq.query.execution.records import DENSITY, Record, decode_record, record_of
+from scenicq.query.execution.result_tables import METADATA, read_row
 from scenicq.store.unpacked import RECORD_BYTES, Bound, check_claims, decoded_bytes, text_columns
 
-__all__ = ["Record", "read_records", "read_results"]
+__all__ = ["read_records", "read_results"]
 
-Record = Mapping[str, Any]
-"""One result: frame, recording, verdict, what else `scenicq.query.execution.results.record` gives, and the dataset."""
-
-_TEXTS = ("frame", "recording", "verdict")
-_NEEDED = (*_TEXTS, "timestamp_us", "correspondence", "cause")
+_NEEDED = ("frame", "recording", "verdict", "timestamp_us", "correspondence", "cause",
+           "start_us", "end_us", "frames")  # fmt: skip
+"""What tells what became of a result."""
 _NESTED = ("correspondence", "cause", "sensors", "witness", "frames")
-_TIMES = ("timestamp_us", "start_us", "end_us")
 _LONGEST = 10_000_000
 """Characters of a cell of CSV."""
 
 
 def read_results(path: Path) -> dict[str, Record]:
-    """The results in a file by frame; of several of one frame the first match counts.
+    """The results in a file by frame, or by recording and start; of several of one the first match counts.
 
     Raises:
         DataError: file-missing, or file-invalid.
     """
     found: dict[str, Record] = {}
-    for where, each in _records(path, _NEEDED):
-        _check(path, where, each, _TEXTS)
-        old = found.get(each["frame"])
-        if old is None or (each["verdict"] == "match" and old["verdict"] != "match"):
-            found[each["frame"]] = each
+    for each in _records(path, _NEEDED):
+        old = found.get(each.name)
+        if old is None or (each.verdict == "match" and old.verdict != "match"):
+            found[each.name] = each
     return found
 
 
@@ -56,14 +52,16 @@ def read_records(path: Path) -> Iterator[Record]:
     Raises:
         DataError: file-missing, or file-invalid.
     """
-    for where, each in _records(path, None):
-        _check(path, where, each, ("verdict",))
-        _check(path, where, each, ("frame",) if "frame" in each else ("recording",))
-        yield each
+    return _records(path, None)
 
 
-def _records(path: Path, columns: tuple[str, ...] | None) -> Iterator[tuple[str, Record]]:
-    """The results, each with the line or row where it is."""
+def _records(path: Path, columns: tuple[str, ...] | None) -> Iterator[Record]:
+    """The results.
+
+    Args:
+        path: The file.
+        columns: What is read of Parquet, as far as it is there; None for all.
+    """
     try:
         data = path.read_bytes()
     except OSError as error:
@@ -89,66 +87,60 @@ def _text(path: Path, data: bytes) -> str:
         raise _invalid(path, "it is not text in UTF-8") from None
 
 
-def _json(path: Path, where: str, text: str) -> Any:
+def _read(path: Path, where: str, read: Callable[[], Record]) -> Record:
     try:
-        return json.loads(text)
-    except (ValueError, RecursionError):
-        raise _invalid(path, f"{where} is not JSON") from None
+        return read()
+    except (msgspec.DecodeError, RecursionError) as error:
+        raise _invalid(path, f"{where} is no result: {error}") from None
 
 
-def _check(path: Path, where: str, each: Any, texts: tuple[str, ...]) -> None:
-    if not isinstance(each, dict) or not all(isinstance(cast(Record, each).get(key), str) for key in texts):
-        raise _invalid(path, f"{where} is no result")
-
-
-def _of_lines(path: Path, text: str) -> Iterator[tuple[str, Any]]:
+def _of_lines(path: Path, text: str) -> Iterator[Record]:
     for number, line in enumerate(text.split("\n"), 1):
         if line.strip():
-            where = f"line {number}"
-            yield where, _json(path, where, line)
+            yield _read(path, f"line {number}", lambda line=line: decode_record(line))
 
 
-def _of_csv(path: Path, text: str) -> Iterator[tuple[str, Record]]:
+def _of_csv(path: Path, text: str) -> Iterator[Record]:
     limit = csv.field_size_limit(_LONGEST)
     try:
         rows = csv.DictReader(io.StringIO(text, newline=""), strict=True)
         for number, row in enumerate(rows, 1):
-            # a row that is too long or too short has cells that are no texts
-            cells = {name: unquote_cell(cell) if isinstance(cell, str) else cell for name, cell in row.items()}
-            yield f"row {number}", _row(path, f"row {number}", cells)
+            yield _read(path, f"row {number}", lambda row=row: record_of(_values(row)))
     except csv.Error as error:
         raise _invalid(path, f"it is not CSV: {error}") from None
     finally:
         csv.field_size_limit(limit)
 
 
-def _of_parquet(path: Path, data: bytes, columns: tuple[str, ...] | None) -> Iterator[tuple[str, Record]]:
+def _values(row: Mapping[str, Any]) -> dict[str, Any]:
+    """The values of cells, of which some hold JSON; an empty one says nothing."""
+    found: dict[str, Any] = {}
+    for name, cell in row.items():
+        # a row that is too long or too short has cells that are no texts
+        text = unquote_cell(cell) if isinstance(cell, str) else cell
+        if text == "":
+            found |= {name: None} if name in DENSITY else {}
+        else:
+            found[name] = msgspec.json.decode(text) if name in _NESTED and isinstance(text, str) else text
+    if found.get("cause") == {}:
+        del found["cause"]
+    return found
+
+
+def _of_parquet(path: Path, data: bytes, columns: tuple[str, ...] | None) -> Iterator[Record]:
     try:
         bound = Bound(path, len(data))
         with pq.ParquetFile(pa.BufferReader(data)) as parquet:
-            check_claims(parquet, bound, columns)
+            chosen = None if columns is None else [name for name in columns if name in parquet.schema_arrow.names]
+            check_claims(parquet, bound, chosen)
             bound.check(RECORD_BYTES * parquet.metadata.num_rows)
             texts = text_columns(parquet)
-        chosen = None if columns is None else list(columns)
         table = pq.read_table(pa.BufferReader(data), columns=chosen, read_dictionary=texts)
         for chunk in (chunk for column in table.columns for chunk in column.chunks):
             bound.add(decoded_bytes(chunk))
     except (pa.ArrowException, OSError) as error:
         raise _invalid(path, f"it is not Parquet with results: {str(error).partition(chr(10))[0]}") from None
     origin = (table.schema.metadata or {}).get(METADATA, b"").decode(errors="replace")
-    named = {ORIGIN: origin} if origin else {}
-    for number, row in enumerate(table.to_pylist(), 1):
-        yield f"row {number}", _row(path, f"row {number}", read_row(row) | named)
-
-
-def _row(path: Path, where: str, row: Record) -> Record:
-    """A row of plain cells, of which some hold JSON."""
-    found = dict(row)
-    for name in _NESTED:
-        if isinstance(found.get(name), str):
-            found[name] = _json(path, f"{name} in {where}", found[name])
-    for name in _TIMES:
-        time = found.get(name)
-        if isinstance(time, str) and time.removeprefix("-").isdecimal() and len(time) < 20:
-            found[name] = int(time)
-    return found
+    rows: list[dict[str, Any]] = table.to_pylist()
+    for number, row in enumerate(rows, 1):
+        yield _read(path, f"row {number}", lambda row=row: read_row(row, origin))

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from typing import Any
+from collections.abc import Iterable
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.store.dataset import Dataset
 
-__all__ = ["METADATA", "ORIGIN", "check_origins", "name_origin"]
+__all__ = ["check_origins", "name_origin"]
 
-ORIGIN = "dataset"
-"""Key of a record, and column of CSV."""
-METADATA = b"scenicq.dataset"
-"""Key of the metadata of a Parquet file."""
 _DIGITS = 8
 
 
@@ -25,13 +20,11 @@ def name_origin(dataset: Dataset) -> str:
     return f"{dataset.manifest.name}@{dataset.manifest.digest[:_DIGITS]}"
 
 
-def check_origins(
-    first: tuple[str, Iterable[Mapping[str, Any]]], second: tuple[str, Iterable[Mapping[str, Any]]]
-) -> Diagnostic | None:
+def check_origins(first: tuple[str, Iterable[str]], second: tuple[str, Iterable[str]]) -> Diagnostic | None:
     """Refuse results of different datasets; those that do not say which are taken as they are.
 
     Args:
-        first: What messages call it, and its records.
+        first: What messages call it, and the datasets that its records name; "" where they name none.
         second: The same of the other.
 
     Returns:
@@ -40,7 +33,7 @@ def check_origins(
     Raises:
         DataError: option-invalid: the datasets have different names.
     """
-    (one, mine), (other, theirs) = ((told, _origins(records)) for told, records in (first, second))
+    (one, mine), (other, theirs) = ((told, _origins(names)) for told, names in (first, second))
     if not mine or not theirs or mine == theirs:
         return None
     told = f"{one} is of {_listed(mine)}, {other} of {_listed(theirs)}"
@@ -50,9 +43,8 @@ def check_origins(
     return Diagnostic("option-invalid", f"the dataset has changed: {told}", hints=(hint,), severity="warning")
 
 
-def _origins(records: Iterable[Mapping[str, Any]]) -> set[tuple[str, str]]:
-    named = {str(each[ORIGIN]) for each in records if each.get(ORIGIN)}
-    return {(name, version) for name, _, version in (each.rpartition("@") for each in named)}
+def _origins(names: Iterable[str]) -> set[tuple[str, str]]:
+    return {(name, version) for name, _, version in (each.rpartition("@") for each in {*names} - {""})}
 
 
 def _listed(origins: set[tuple[str, str]]) -> str:

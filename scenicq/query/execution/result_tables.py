@@ -1,11 +1,12 @@
-"""Results as Arrow tables with typed columns: the label object of each role is a field of its own.
+"""Results as Arrow tables, whose columns are the fields of records: each role is a field of its own.
 
 correspondence   struct   one text a role, null where nobody plays it
 witness          map      place of a random variable -> its numbers: one, or the two of a point
 cause            struct   what, detail, place, reason; null in a match
 sensors          map      channel -> path
+frames           struct   of an interval: first, last, count
 
-For intervals, `frames` is a struct of the first and the last frame and how many there are.
+The dataset stands in the metadata.
 """
 
 # pyarrow has no type stubs.
@@ -17,22 +18,28 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, cast
 
+import msgspec
 import pyarrow as pa
+from msgspec import inspect
 
-from scenicq.query.execution.result_origin import METADATA, ORIGIN
+from scenicq.query.execution.records import DENSITY, FrameRecord, IntervalRecord, Record, record_of
 
-__all__ = ["DENSITY_COLUMNS", "read_row", "result_schema", "result_table", "roles_of"]
+__all__ = ["METADATA", "read_row", "result_schema", "result_table", "roles_of"]
 
-_CAUSE = ("what", "detail", "place", "reason")
+METADATA = b"scenicq.dataset"
+"""Key of the metadata, under which the dataset stands."""
+_PLAIN: dict[type[inspect.Type], Any] = {
+    inspect.StrType: pa.string,
+    inspect.LiteralType: pa.string,
+    inspect.IntType: pa.int64,
+    inspect.FloatType: pa.float64,
+    inspect.BoolType: pa.bool_,
+}
 
 
-def roles_of(records: Iterable[Mapping[str, Any]]) -> tuple[str, ...]:
+def roles_of(records: Iterable[Record]) -> tuple[str, ...]:
     """The roles that records name, in the order in which they come up: the ego, which every scenario has, first."""
-    return tuple(dict.fromkeys(("ego", *(role for each in records for role in each["correspondence"]))))
-
-
-DENSITY_COLUMNS = ("log_density", "log_density_error", "log_weight", "no_density")
-"""Columns of results that are ranked: numbers, and why there is none."""
+    return tuple(dict.fromkeys(("ego", *(role for each in records for role in each.correspondence))))
 
 
 def result_schema(
@@ -46,56 +53,64 @@ def result_schema(
         ranked: Whether results have a density.
         over_time: Whether the results are intervals.
     """
-    text = pa.string()
-    kinds = (pa.float64(), pa.float64(), pa.float64(), text)
-    more = list(zip(DENSITY_COLUMNS, kinds, strict=True)) if ranked else []
-    time, frame, frames = (
-        pa.int64(),
-        ("frame", text),
-        pa.struct([("first", text), ("last", text), ("count", pa.int64())]),
-    )
-    of_interval = [("recording", text), ("start_us", time), ("end_us", time), ("frames", frames)]
-    return pa.schema(
-        [
-            *(of_interval if over_time else [frame, ("recording", text), ("timestamp_us", time)]),
-            ("verdict", text),
-            ("correspondence", pa.struct([(role, text) for role in roles])),
-            ("witness", pa.map_(text, pa.list_(pa.float64()))),
-            ("cause", pa.struct([(name, text) for name in _CAUSE])),
-            ("open_ended", pa.bool_()) if over_time else ("sensors", pa.map_(text, text)),
-            *more,
-        ],
-        metadata={METADATA: origin.encode()} if origin else None,
-    )
+    left_out = {"dataset", *(() if ranked else DENSITY)}
+    columns = [
+        (each.name, pa.struct([(role, pa.string()) for role in roles]))
+        if each.name == "correspondence"
+        else (each.name, _column(each.type))
+        for each in _struct(IntervalRecord if over_time else FrameRecord).fields
+        if each.name not in left_out
+    ]
+    return pa.schema(columns, metadata={METADATA: origin.encode()} if origin else None)
 
 
-def result_table(records: Iterable[Mapping[str, Any]], schema: pa.Schema) -> pa.Table:
+def _struct(kind: type[Record]) -> inspect.StructType:
+    return cast(inspect.StructType, inspect.type_info(kind))
+
+
+def _column(kind: inspect.Type) -> pa.DataType:
+    """The column of a field: what may be absent is null, a number or several of them are a list."""
+    match kind:
+        case inspect.StructType():
+            return pa.struct([(each.name, _column(each.type)) for each in kind.fields])
+        case inspect.DictType():
+            return pa.map_(pa.string(), _column(kind.value_type))
+        case inspect.UnionType():
+            if any(isinstance(each, inspect.TupleType) for each in kind.types):
+                return pa.list_(pa.float64())
+            (known,) = (each for each in kind.types if not isinstance(each, inspect.NoneType))
+            return _column(known)
+        case _:
+            return _PLAIN[type(kind)]()
+
+
+def result_table(records: Iterable[Record], schema: pa.Schema) -> pa.Table:
     """Records as a table.
 
     Args:
-        records: As `scenicq.query.execution.results.record` gives them.
+        records: The records.
         schema: Of `result_schema`, with every role that the records name.
     """
     return pa.Table.from_pylist([_row(each) for each in records], schema=schema)
 
 
-def _row(record: Mapping[str, Any]) -> dict[str, Any]:
-    witness = cast("Mapping[str, float | Sequence[float]]", record["witness"])
-    cells = {name: value for name, value in record.items() if name != ORIGIN}
-    return {
-        **cells,
-        "witness": [(place, [value] if isinstance(value, int | float) else value) for place, value in witness.items()],
-        "sensors": list(record.get("sensors", {}).items()),
-    }
+def _row(record: Record) -> dict[str, Any]:
+    cells: dict[str, Any] = msgspec.to_builtins(record)
+    listed = ((place, [value] if isinstance(value, int | float) else value) for place, value in record.witness.items())
+    return cells | {"witness": [*listed], "sensors": [*cells.get("sensors", {}).items()]}
 
 
-def read_row(row: Mapping[str, Any]) -> dict[str, Any]:
+def read_row(row: Mapping[str, Any], origin: str = "") -> Record:
     """The record that a row was made of.
 
     Args:
         row: As pyarrow's `to_pylist` gives it, of any of the columns.
+        origin: The dataset.
+
+    Raises:
+        msgspec.ValidationError: It is no record's.
     """
-    found = dict(row)
+    found = {name: value for name, value in row.items() if value is not None or name in DENSITY}
     for name in ("correspondence", "cause"):
         if isinstance(cells := found.get(name), dict):
             found[name] = {key: value for key, value in cast("dict[str, Any]", cells).items() if value is not None}
@@ -105,6 +120,4 @@ def read_row(row: Mapping[str, Any]) -> dict[str, Any]:
     if isinstance(witness := found.get("witness"), dict):
         numbers = cast("dict[str, list[float]]", witness)
         found["witness"] = {place: value[0] if len(value) == 1 else value for place, value in numbers.items()}
-    if found.get("cause", ...) is None:
-        del found["cause"]
-    return found
+    return record_of(found | ({"dataset": origin} if origin else {}))

@@ -1,4 +1,4 @@
-"""Results of a query as records, and the funnel that says where the other frames went."""
+"""Results of a query, and the funnel that says where the other frames went."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from scenicq.errors import Diagnostic
-from scenicq.match.verdict import Cause, Match, NoMatch, Unknown, Verdict
+from scenicq.match.verdict import Match, NoMatch, Unknown, Verdict
 
-__all__ = ["Funnel", "IntervalSpan", "LogDensity", "Result", "record"]
+__all__ = ["Funnel", "IntervalSpan", "LogDensity", "Result"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,55 +74,6 @@ class Result:
     def __reduce__(self) -> tuple[type[Result], tuple[Any, ...]]:
         """Pickled as a call, which takes half the time; densities are computed where results arrive."""
         return Result, (self.frame, self.recording, self.timestamp_us, self.verdict, self.sensors, self.interval)
-
-
-def _cause(cause: Cause) -> dict[str, Any]:
-    found = {"what": cause.what, "detail": cause.detail, "place": cause.place}
-    return {key: value for key, value in found.items() if value}
-
-
-_NAMES = {Match: "match", NoMatch: "no_match", Unknown: "unknown"}
-
-
-def record(result: Result) -> dict[str, Any]:
-    """A result as plain values with stable keys in a stable order, ready for JSON."""
-    verdict = result.verdict
-    found = _which(result)
-    found["verdict"], found["correspondence"], found["witness"] = _NAMES[type(verdict)], {}, {}
-    match verdict:
-        case Match():
-            found["correspondence"] = dict(verdict.correspondence)
-            found["witness"] = {k: list(v) if isinstance(v, tuple) else v for k, v in verdict.witness.items()}
-        case Unknown():
-            found["correspondence"] = dict(verdict.correspondence)
-            found["cause"] = {**_cause(verdict.cause), "reason": verdict.reason}
-        case NoMatch():
-            found["correspondence"] = dict(verdict.partial)
-            found["cause"] = _cause(verdict.cause)
-    if result.interval is None:
-        found["sensors"] = dict(result.sensors)
-    else:
-        found["open_ended"] = result.interval.open_ended
-    density = result.density
-    if density is not None:
-        found["log_density"] = density.log
-        found["log_density_error"] = None if density.log is None else density.error
-        found["log_weight"] = density.log_weight
-        if density.reason:
-            found["no_density"] = density.reason
-    return found
-
-
-def _which(result: Result) -> dict[str, Any]:
-    span = result.interval
-    if span is None:
-        return {"frame": result.frame, "recording": result.recording, "timestamp_us": result.timestamp_us}
-    return {
-        "recording": result.recording,
-        "start_us": result.timestamp_us,
-        "end_us": span.end_us,
-        "frames": {"first": result.frame, "last": span.last, "count": span.count},
-    }
 
 
 @dataclass(slots=True)

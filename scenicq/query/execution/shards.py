@@ -12,8 +12,9 @@ from scenicq.match.verdict import Match
 from scenicq.processes import Lost, Workers, as_many_as_pay
 from scenicq.query.execution.partitions import Partition, gather, is_done, partitions, write_partition
 from scenicq.query.execution.program_files import SiblingFiles
-from scenicq.query.execution.record_reader import name_question, read_record
-from scenicq.query.execution.results import Funnel, Result, record
+from scenicq.query.execution.question_notes import name_question
+from scenicq.query.execution.records import read_record, record
+from scenicq.query.execution.results import Funnel, Result
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.dataset import DatasetReference
 

@@ -9,7 +9,7 @@ from made_up import TIED
 from programs import HEADER
 
 from scenicq.errors import Source
-from scenicq.query.execution.results import record
+from scenicq.query.execution.records import record
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.dataset import Dataset
 

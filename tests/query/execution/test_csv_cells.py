@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from scenicq.query.execution.csv_cells import quote_cell, unquote_cell
+from scenicq.query.execution.records import json_text, record_of
 from scenicq.query.execution.result_files import read_records
 from scenicq_cli.formats import make_writer
 
@@ -47,9 +48,9 @@ def test_records_come_back(tmp_path: Path, name: str) -> None:
     for form, suffix in (("csv", "csv"), ("spreadsheet", "csv"), ("jsonl", "jsonl")):
         sink = io.BytesIO()
         writer = make_writer(form, sink, lambda: ("ego", "other"), origin=f"{name}@1")
-        writer.write(record)
+        writer.write(record_of(record))
         writer.finish()
         (tmp_path / f"r.{suffix}").write_bytes(sink.getvalue())
         (found,) = read_records(tmp_path / f"r.{suffix}")
-        read[form] = {key: found[key] for key in record}
+        read[form] = json.loads(json_text(found))
     assert read["csv"] == read["spreadsheet"] == read["jsonl"] == json.loads(json.dumps(record))

@@ -14,7 +14,7 @@ from scenicq.match.options import MatchOptions
 from scenicq.query.execution import deadline
 from scenicq.query.execution.partitions import fingerprint
 from scenicq.query.execution.program_files import read_program
-from scenicq.query.execution.results import record
+from scenicq.query.execution.records import record
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.query.execution.shards import in_order, kept, run_here, shards_of
 from scenicq.store.dataset import Dataset, open_dataset

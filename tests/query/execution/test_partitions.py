@@ -13,7 +13,7 @@ from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import EXACT, parse_tolerance
 from scenicq.query.execution.partitions import Partition, fingerprint, gather, is_done, partitions, write_partition
 from scenicq.query.execution.program_files import read_program
-from scenicq.query.execution.results import record
+from scenicq.query.execution.records import record
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.query.execution.shards import kept, run_here
 from scenicq.store.dataset import Dataset, open_dataset

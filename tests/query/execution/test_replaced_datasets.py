@@ -17,7 +17,8 @@ from scenicq.errors import DataError
 from scenicq.importers.ingest import ingest
 from scenicq.match.options import MatchOptions
 from scenicq.query.execution.program_files import read_program
-from scenicq.query.execution.results import Result, record
+from scenicq.query.execution.records import record
+from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.query.execution.shards import Engine, in_order, run_here, shards_of
 from scenicq.store.dataset import open_dataset
@@ -158,7 +159,7 @@ def test_nothing_opens_a_dataset_in_another_process_by_its_address() -> None:
         "cli/index.py",
         "scenicq/importers/ingest.py",
         "scenicq/notebook/datasets.py",
-        "scenicq/query/execution/record_reader.py",
+        "scenicq/query/execution/question_notes.py",
         "scenicq/store/dataset.py",
     }
 
@@ -181,4 +182,4 @@ def test_a_file_that_a_program_imports_is_read_once(ways: Callable[[Query], Iter
     query.compile("crossroads")
     library.write_text("nearest = 0\n")
     assert [record(result) for result in ways(query)] == expected
-    assert len({each["verdict"] for each in expected}) == 2
+    assert len({each.verdict for each in expected}) == 2

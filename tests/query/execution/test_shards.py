@@ -25,7 +25,8 @@ from scenicq.match.verdict import Unknown
 from scenicq.query.execution import dask_engine as dask
 from scenicq.query.execution.partitions import partitions
 from scenicq.query.execution.program_files import read_program
-from scenicq.query.execution.results import Funnel, record
+from scenicq.query.execution.records import record
+from scenicq.query.execution.results import Funnel
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.query.execution.shards import Question, in_order, kept, run_here, shards_of
 from scenicq.query.prefilter import executor

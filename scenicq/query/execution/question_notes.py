@@ -1,64 +1,24 @@
-"""From records back to results and questions: what pieces on disk need to be exported and pictured like fresh ones."""
+"""What is asked, written beside the pieces of its results: they are exported and pictured like fresh ones."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
-from scenicq.errors import DataError, Diagnostic, Source, Span
+from scenicq.errors import DataError, Diagnostic, Source
 from scenicq.forest.scenario import BuiltIn
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import Tolerance
-from scenicq.match.verdict import Cause, Match, NoMatch, Unknown, Verdict, WitnessValue
 from scenicq.query.execution.partitions import fingerprint
 from scenicq.query.execution.program_files import SiblingFiles, program_text
-from scenicq.query.execution.results import IntervalSpan, Result
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.atomic_files import made_folder, write_whole
 from scenicq.store.dataset import open_dataset
 from scenicq.temporal.interval_options import IntervalOptions
 
-__all__ = ["name_question", "note_question", "noted_question", "read_record"]
-
-
-def read_record(record: Mapping[str, Any], source: Source) -> Result:
-    """The result that `scenicq.query.execution.results.record` made a record of.
-
-    Args:
-        record: The record.
-        source: The program, in which causes have their place.
-    """
-    verdict = _verdict(record, source)
-    if "frames" not in record:
-        return Result(record["frame"], record["recording"], record["timestamp_us"], verdict, record["sensors"])
-    frames = record["frames"]
-    span = IntervalSpan(frames["last"], record["end_us"], frames["count"], record["open_ended"])
-    return Result(frames["first"], record["recording"], record["start_us"], verdict, interval=span)
-
-
-def _verdict(record: Mapping[str, Any], source: Source) -> Verdict:
-    roles: dict[str, str] = record["correspondence"]
-    if record["verdict"] == "match":
-        witness: dict[str, WitnessValue] = {
-            name: (value[0], value[1]) if isinstance(value, list) else value
-            for name, value in cast("dict[str, Any]", record["witness"]).items()
-        }
-        return Match(roles, witness)
-    told: dict[str, str] = record["cause"]
-    cause = Cause(told.get("what", ""), told.get("detail", ""), _span(told.get("place", ""), source))
-    return Unknown(told["reason"], cause, roles) if record["verdict"] == "unknown" else NoMatch(cause, roles)
-
-
-def _span(place: str, source: Source) -> Span | None:
-    name, *numbers = place.rsplit(":", 2)
-    if name != source.file_name or len(numbers) != 2:
-        return None
-    line, column = map(int, numbers)
-    start = source.line_starts[line - 1] + column - 1
-    return Span(source, start, min(start + 1, len(source.text)))
+__all__ = ["name_question", "note_question", "noted_question"]
 
 
 def name_question(query: Query) -> str:

@@ -1,0 +1,249 @@
+"""Results as they are written: one declaration gives lines of JSON, cells of CSV, columns of Arrow, and the way back.
+
+What does not fit the declaration is refused with its place, as ``Expected `str`, got `int` - at `$.recording` ``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Literal
+
+import msgspec
+from msgspec import UNSET, Struct, UnsetType
+
+from scenicq.errors import Source, Span
+from scenicq.match.verdict import Cause, Match, NoMatch, Unknown, Verdict, WitnessValue
+from scenicq.query.execution.results import IntervalSpan, LogDensity, Result
+
+__all__ = [
+    "DENSITY",
+    "CauseRecord",
+    "FrameRecord",
+    "FramesRecord",
+    "IntervalRecord",
+    "Record",
+    "decode_record",
+    "json_text",
+    "read_record",
+    "record",
+    "record_of",
+]
+
+Number = int | float
+VerdictName = Literal["match", "unknown", "no_match"]
+_NAMES: dict[type[Verdict], VerdictName] = {Match: "match", NoMatch: "no_match", Unknown: "unknown"}
+
+
+class CauseRecord(Struct, frozen=True, omit_defaults=True):
+    """What excludes a match, or leaves it open.
+
+    Attributes:
+        what: The feature or requirement, in the words of the program.
+        detail: The fact.
+        place: `file:line:column`.
+        reason: Why it is unknown; "" where the frame does not match.
+    """
+
+    what: str = ""
+    detail: str = ""
+    place: str = ""
+    reason: str = ""
+
+
+class FramesRecord(Struct, frozen=True):
+    """The frames of an interval: the first, the last, and how many there are."""
+
+    first: str
+    last: str
+    count: int
+
+
+class FrameRecord(Struct, frozen=True, kw_only=True):
+    """The verdict on one frame.
+
+    Attributes:
+        frame, recording, timestamp_us: Which frame.
+        verdict: `match`, `unknown`, or `no_match`.
+        correspondence: The label object of each role.
+        witness: A value of each random variable that proves a match, a number or a point, by its place in the program.
+        cause: What excludes a match, or leaves it open; absent in a match.
+        sensors: The sensor file of each channel.
+        log_density, log_density_error, log_weight, no_density: How typical the label is, as
+            `scenicq.query.execution.results.LogDensity` has it; absent where that was not asked for.
+        dataset: The dataset and its version; absent where it is not known.
+    """
+
+    frame: str
+    recording: str
+    timestamp_us: int = 0
+    verdict: VerdictName
+    correspondence: dict[str, str] = {}
+    witness: dict[str, Number | tuple[Number, Number]] = {}
+    cause: CauseRecord | UnsetType = UNSET
+    sensors: dict[str, str] = {}
+    log_density: float | UnsetType | None = UNSET
+    log_density_error: float | UnsetType | None = UNSET
+    log_weight: float | UnsetType | None = UNSET
+    no_density: str | UnsetType | None = UNSET
+    dataset: str | UnsetType = UNSET
+
+    @property
+    def name(self) -> str:
+        """What tells it from the other results: the name of the frame."""
+        return self.frame
+
+
+class IntervalRecord(Struct, frozen=True, kw_only=True):
+    """The verdict on an interval of a recording.
+
+    Attributes:
+        recording: The recording.
+        start_us, end_us: Timestamps of the first and the last frame.
+        frames: The first and the last frame, and how many there are.
+        verdict: `match`, `unknown`, or `no_match`.
+        correspondence: The track of each role.
+        witness, cause: As of a frame.
+        open_ended: Whether the program does not say when the interval ends.
+        log_density, log_density_error, log_weight, no_density, dataset: As of a frame.
+    """
+
+    recording: str
+    start_us: int
+    end_us: int
+    frames: FramesRecord
+    verdict: VerdictName
+    correspondence: dict[str, str] = {}
+    witness: dict[str, Number | tuple[Number, Number]] = {}
+    cause: CauseRecord | UnsetType = UNSET
+    open_ended: bool = False
+    log_density: float | UnsetType | None = UNSET
+    log_density_error: float | UnsetType | None = UNSET
+    log_weight: float | UnsetType | None = UNSET
+    no_density: str | UnsetType | None = UNSET
+    dataset: str | UnsetType = UNSET
+
+    @property
+    def name(self) -> str:
+        """What tells it from the other results: its recording and where it starts."""
+        return f"{self.recording}@{self.start_us}"
+
+
+Record = FrameRecord | IntervalRecord
+DENSITY = ("log_density", "log_density_error", "log_weight", "no_density")
+"""The fields of results that are ranked."""
+
+_encode = msgspec.json.Encoder().encode
+_fields = msgspec.json.Decoder(dict[str, msgspec.Raw]).decode
+_decode = {kind: msgspec.json.Decoder(kind).decode for kind in (FrameRecord, IntervalRecord)}
+
+
+def json_text(value: Any) -> str:
+    """A record, or a part of one, as JSON on one line; a number has the fewest digits that read back as it is."""
+    return msgspec.json.format(_encode(value), indent=0).decode()
+
+
+def _kind(names: Mapping[str, object]) -> type[Record]:
+    return IntervalRecord if "frames" in names else FrameRecord
+
+
+def decode_record(line: str | bytes) -> Record:
+    """The record that a line of JSON holds.
+
+    Raises:
+        msgspec.DecodeError: It holds none.
+    """
+    return _decode[_kind(_fields(line))](line)
+
+
+def record_of(values: Mapping[str, Any]) -> Record:
+    """The record that plain values make; numbers and truth values may be texts, as in cells of CSV.
+
+    Raises:
+        msgspec.ValidationError: They make none.
+    """
+    return msgspec.convert(values, _kind(values), strict=False)
+
+
+def record(result: Result, dataset: str = "") -> Record:
+    """A result as it is written.
+
+    Args:
+        result: The result.
+        dataset: The dataset, as `scenicq.query.execution.result_origin.name_origin` says it; "" where it is not known.
+    """
+    verdict, span = result.verdict, result.interval
+    witness: dict[str, Any] = {}
+    cause: CauseRecord | UnsetType = UNSET
+    if isinstance(verdict, Match):
+        roles = verdict.correspondence
+        witness = {name: value if type(value) is float else _plain(value) for name, value in verdict.witness.items()}
+    elif isinstance(verdict, Unknown):
+        roles, cause = verdict.correspondence, _cause(verdict.cause, verdict.reason)
+    else:
+        roles, cause = verdict.partial, _cause(verdict.cause, "")
+    name, origin = _NAMES[type(verdict)], dataset or UNSET
+    more = {} if result.density is None else _density(result.density)
+    if span is None:
+        return FrameRecord(frame=result.frame, recording=result.recording, timestamp_us=result.timestamp_us,
+                           verdict=name, correspondence=_dict(roles), witness=witness, cause=cause,
+                           sensors=_dict(result.sensors), dataset=origin, **more)  # fmt: skip
+    frames = FramesRecord(result.frame, span.last, span.count)
+    return IntervalRecord(recording=result.recording, start_us=result.timestamp_us, end_us=span.end_us, frames=frames,
+                          verdict=name, correspondence=_dict(roles), witness=witness, cause=cause,
+                          open_ended=span.open_ended, dataset=origin, **more)  # fmt: skip
+
+
+def _dict(texts: Mapping[str, str]) -> dict[str, str]:
+    return texts if isinstance(texts, dict) else dict(texts)
+
+
+def _density(density: LogDensity) -> dict[str, Any]:
+    error = None if density.log is None else density.error
+    values = (density.log, error, density.log_weight, density.reason or UNSET)
+    return dict(zip(DENSITY, values, strict=True))
+
+
+def _plain(value: WitnessValue) -> Any:
+    """A number, or two, of Python's own types."""
+    if isinstance(value, tuple):
+        return value if type(value[0]) is type(value[1]) is float else tuple(map(_plain, value))
+    return value if type(value) in (float, int) else float(value)
+
+
+def _cause(cause: Cause, reason: str) -> CauseRecord:
+    return CauseRecord(cause.what, cause.detail, cause.place, reason)
+
+
+def read_record(record: Record, source: Source) -> Result:
+    """The result that a record was made of, but for how typical it is.
+
+    Args:
+        record: The record.
+        source: The program, in which causes have their place.
+    """
+    verdict = _verdict(record, source)
+    if isinstance(record, FrameRecord):
+        return Result(record.frame, record.recording, record.timestamp_us, verdict, record.sensors)
+    frames = record.frames
+    span = IntervalSpan(frames.last, record.end_us, frames.count, record.open_ended)
+    return Result(frames.first, record.recording, record.start_us, verdict, interval=span)
+
+
+def _verdict(record: Record, source: Source) -> Verdict:
+    roles = record.correspondence
+    if record.verdict == "match":
+        return Match(roles, record.witness)
+    told = record.cause or CauseRecord()
+    cause = Cause(told.what, told.detail, _span(told.place, source))
+    return Unknown(told.reason, cause, roles) if record.verdict == "unknown" else NoMatch(cause, roles)
+
+
+def _span(place: str, source: Source) -> Span | None:
+    name, *numbers = place.rsplit(":", 2)
+    if name != source.file_name or len(numbers) != 2 or not all(map(str.isdecimal, numbers)):
+        return None
+    line, column = map(int, numbers)
+    if not 1 <= line <= len(source.line_starts):
+        return None
+    start = source.line_starts[line - 1] + column - 1
+    return Span(source, start, min(start + 1, len(source.text)))
