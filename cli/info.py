@@ -66,8 +66,8 @@ def _motion(dataset: Dataset) -> list[str]:
         own, derived, unknown = (f"{each / known.total:.1%}" for each in (known.own, known.derived, known.unknown))
         rows.append((name, own, derived, unknown))
     found = columns(rows, right=frozenset({1, 2, 3}), indent="") if len(rows) > 1 else []
-    facts = dataset.manifest.provenance.get("facts")
-    if isinstance(facts, dict) and "velocity" in facts:
+    facts = dataset.manifest.provenance.facts
+    if "velocity" in facts:
         found.append(f"velocity of labels: {facts['velocity']}")
     steps, gaps = observed.steps, observed.gaps
     if steps is None:
@@ -107,15 +107,15 @@ def _fit(fits: Sequence[MapFit], maps: int) -> list[str]:
 def _lines(dataset: Dataset, fits: Sequence[MapFit]) -> list[str]:
     manifest = dataset.manifest
     span = manifest.span_us
-    source, made = manifest.provenance.get("source", "unknown"), manifest.provenance.get("time", "unknown")
-    versions = ", ".join(f"{name} {number}" for name, number in manifest.provenance.get("versions", {}).items())
+    made = manifest.provenance
+    versions = ", ".join(f"{name} {number}" for name, number in made.versions.items())
     clock = "UTC" if span is None or is_date(span[0]) else "by the source's own clock, which tells no date"
     without_map = sorted(set(manifest.by_map) - set(manifest.maps))
     return [
         f"{manifest.name}: {count(manifest.total.frames, 'frame')}, {count(manifest.total.objects, 'object')}, "
         f"{count(manifest.tracks, 'track')} in {count(len(manifest.by_recording), 'recording')}",
         *([f"from {moment(span[0])} to {moment(span[1])} ({clock})"] if span else []),
-        f"read as {manifest.importer} from {source} on {made}",
+        f"read as {manifest.importer} from {made.source} on {made.time}",
         f"with {versions}",
         "",
         *_classes(manifest),

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import cast
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,8 +24,7 @@ class EgoPoses:
 
     def __init__(self, dataset: Dataset, frames: Frames) -> None:
         """Take them from a dataset."""
-        facts = cast("Mapping[str, object]", dataset.manifest.provenance.get("facts") or {})
-        behind = facts.get("ego_centre_ahead_of_rear_axle_m", 0.0)
+        behind = dataset.manifest.provenance.facts.get("ego_centre_ahead_of_rear_axle_m", 0.0)
         behind = float(behind) if isinstance(behind, int | float) else 0.0
         heading, pitch, roll = map(np.nan_to_num, (frames.ego_heading, frames.ego_pitch, frames.ego_roll))
         sine, cosine = np.sin(heading), np.cos(heading)

@@ -21,7 +21,7 @@ from scenicq.importers.opendrive import convert_maps
 from scenicq.importers.registry import choose_importer
 from scenicq.importers.report import Report
 from scenicq.importers.segments import Job, RecordingTask, SegmentPlace, World, fingerprint, maps_digest, write_segments
-from scenicq.store.manifest import LeftOut, Manifest, is_dataset
+from scenicq.store.manifest import LeftOut, Manifest, Provenance, is_dataset
 from scenicq.store.segment import SEGMENT_OBJECTS, is_whole, read_segments, segments_of
 from scenicq.store.writer import DatasetWriter
 
@@ -318,20 +318,20 @@ def _map_files(maps: Sequence[str | Path]) -> dict[str, Path]:
 
 def _provenance(
     source: Path, opened: OpenedSource, options: Options, class_map: str | Path | None, strict: bool
-) -> dict[str, object]:
-    return {
-        "source": readable(source),
-        "time": datetime.now(UTC).isoformat(timespec="seconds"),
-        "versions": {"python": platform.python_version(), "scenicq": __version__}
+) -> Provenance:
+    return Provenance(
+        source=readable(source),
+        time=datetime.now(UTC).isoformat(timespec="seconds"),
+        versions={"python": platform.python_version(), "scenicq": __version__}
         | {package: _version(package) for package in ("numpy", "pyarrow", "shapely")},
-        "options": {
+        options={
             "maps": {readable(name): readable(file) for name, file in options.maps.items()},
             "class_map": None if class_map is None else readable(class_map),
             "ego": None if options.ego is None else readable(options.ego),
             "strict": strict,
         },
-        "facts": dict(opened.facts),
-    }
+        facts=dict(opened.facts),
+    )
 
 
 def _version(package: str) -> str | None:

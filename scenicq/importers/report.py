@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterable
-from dataclasses import replace
+
+from msgspec import structs
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.importers.folders import readable
@@ -142,7 +143,7 @@ class Report:
 
     def _add(self, problem: SourceProblem, *, strict: bool = True) -> None:
         message = _LONG.sub(r"`\1...`", readable(problem.message))
-        problem = replace(problem, name=readable(problem.name), message=message)
+        problem = structs.replace(problem, name=readable(problem.name), message=message)
         if self._strict and strict:
             raise DataError(Diagnostic(problem.code, problem.message, hints=problem.hints))
         known = problem.name and _key(problem) in self._counts

@@ -10,13 +10,14 @@ import json
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import accumulate, groupby, pairwise
 from operator import add, sub
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from msgspec import structs
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.garbage import without_collector
@@ -206,7 +207,7 @@ def _write(world: World, job: Job, indexes: MapIndexes, on_recording: OnRecordin
                     pieces[share.name] = piece
                     if messages.total() > _MOST_MESSAGES:
                         few = tuple(each for each in piece.told if messages[each.what, each.code] < MOST_TOLD)
-                        pieces[share.name] = replace(piece, fingerprint="", told=few)
+                        pieces[share.name] = structs.replace(piece, fingerprint="", told=few)
                     messages.update((each.what, each.code) for each in pieces[share.name].told)
             return writer.finish(job.fingerprint, pieces)
     finally:

@@ -182,7 +182,7 @@ def how_section(query: Query, command: str, elapsed_s: float) -> str:
     manifest = query.dataset.manifest
     about = [("path", query.dataset.name), ("name", manifest.name), ("importer", manifest.importer)]
     about.append(("dataset.json, SHA-256", hashlib.sha256(manifest.to_json().encode()).hexdigest()))
-    about += [(key, str(value)) for key, value in manifest.provenance.items() if isinstance(value, str)]
+    about += [("source", manifest.provenance.source), ("time", manifest.provenance.time)]
     copy = element(
         "p",
         element("code", escape(command), id="command"),

@@ -6,12 +6,11 @@ Everything but `provenance` is a function of the source alone, so two runs over 
 from __future__ import annotations
 
 import hashlib
-import json
-import re
-from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any, cast
+from typing import Annotated, Any
+
+import msgspec
+from msgspec import Meta, Struct, structs
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.store.schema import SCHEMA_VERSION, SCHEMAS, UPGRADABLE
@@ -24,8 +23,9 @@ __all__ = [
     "LeftOut",
     "Manifest",
     "Part",
+    "Provenance",
+    "Whole",
     "check_path",
-    "fields_of",
     "find_links",
     "is_dataset",
     "read_manifest",
@@ -40,32 +40,30 @@ FOLDERS = (*SCHEMAS, SEGMENTS)
 """Names of all folders of a dataset."""
 
 _FORMAT = "scenicq"
-_LARGEST = 1 << 63
-"""What a column of whole numbers holds less than."""
-_PLAIN = re.compile(r"[a-z_]+/[A-Za-z0-9][A-Za-z0-9._-]*\.parquet", re.ASCII)
+Whole = Annotated[int, Meta(ge=0, le=2**63 - 1)]
+"""What a column of whole numbers holds, if it counts something."""
+_Time = Annotated[int, Meta(ge=-(2**63), le=2**63 - 1)]
+_Path = Annotated[str, Meta(pattern=r"^[a-z_]+/[A-Za-z0-9][A-Za-z0-9._-]*\.parquet\Z")]
 """Paths of files: no way out of the dataset, no address, no pattern."""
 
 
-@dataclass(frozen=True, slots=True)
-class Part:
+class Part(Struct, frozen=True):
     """One Parquet file of a table: its path relative to the dataset, size, checksum and number of rows."""
 
-    path: str
-    bytes: int
+    path: _Path
+    bytes: Whole
     sha256: str
-    rows: int
+    rows: Whole
 
 
-@dataclass(frozen=True, slots=True)
-class Counts:
+class Counts(Struct, frozen=True):
     """How much there is of something."""
 
-    frames: int = 0
-    objects: int = 0
+    frames: Whole = 0
+    objects: Whole = 0
 
 
-@dataclass(frozen=True, slots=True)
-class LeftOut:
+class LeftOut(Struct, frozen=True):
     """What is not in the dataset as the source has it.
 
     Attributes:
@@ -78,16 +76,34 @@ class LeftOut:
 
     what: str
     code: str
-    count: int
+    count: Whole
     name: str = ""
     kept: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class Manifest:
+class Provenance(Struct, frozen=True):
+    """What may differ between two runs over one source.
+
+    Attributes:
+        source: The path that was given.
+        time: When, in ISO 8601.
+        versions: Of packages; None where one is not known.
+        options: How the source was read.
+        facts: How values were made, as the importer says it.
+    """
+
+    source: str = "unknown"
+    time: str = "unknown"
+    versions: dict[str, str | None] = {}
+    options: dict[str, Any] = {}
+    facts: dict[str, Any] = {}
+
+
+class Manifest(Struct, frozen=True, kw_only=True, tag_field="format", tag=_FORMAT):
     """The content of `dataset.json`.
 
     Attributes:
+        schema: Version of the tables.
         name: What the source calls itself.
         importer: Name of the importer that read the source.
         tables: The files of each table.
@@ -101,23 +117,32 @@ class Manifest:
         by_recording: Frames and label objects of each recording.
         left_out: What the importer left out or kept with a defect.
         provenance: Versions, options, time: all that may differ between two runs over one source.
-        schema: Version of the tables.
     """
 
+    schema: Whole = SCHEMA_VERSION
     name: str
     importer: str
-    tables: Mapping[str, tuple[Part, ...]]
-    maps: Mapping[str, int]
+    tables: dict[str, tuple[Part, ...]]
+    maps: dict[str, Whole]
     total: Counts
-    tracks: int
-    span_us: tuple[int, int] | None
-    by_class: Mapping[str, int]
-    by_source_class: Mapping[str, int]
-    by_map: Mapping[str, Counts]
-    by_recording: Mapping[str, Counts]
+    tracks: Whole
+    span_us: tuple[_Time, _Time] | None
+    by_class: dict[str, Whole]
+    by_source_class: dict[str, Whole]
+    by_map: dict[str, Counts]
+    by_recording: dict[str, Counts]
     left_out: tuple[LeftOut, ...] = ()
-    provenance: Mapping[str, Any] = field(default_factory=dict[str, Any])
-    schema: int = SCHEMA_VERSION
+    provenance: Provenance = Provenance()
+
+    def __post_init__(self) -> None:
+        """Refuse a manifest that lacks a table.
+
+        Raises:
+            ValueError: It does.
+        """
+        lacking = [name for name in SCHEMAS if name not in self.tables]
+        if lacking:
+            raise ValueError(f"table {lacking[0]} is missing")
 
     @property
     def digest(self) -> str:
@@ -127,13 +152,14 @@ class Manifest:
 
     def to_json(self) -> str:
         """The text of `dataset.json`."""
-        content = {"format": _FORMAT, "schema": self.schema} | fields_of(self)
-        return json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False, default=fields_of) + "\n"
+        return msgspec.json.format(msgspec.json.encode(self), indent=1).decode() + "\n"
 
 
-def fields_of(value: Any) -> dict[str, Any]:
-    """The fields of a dataclass by name, not copied: what `json.dumps` is to write for one."""
-    return {each.name: getattr(value, each.name) for each in fields(value)}
+class _Head(Struct):
+    """What says whether a file is a manifest, and of which version."""
+
+    format: object = None
+    schema: object = None
 
 
 def is_dataset(folder: Path) -> bool:
@@ -141,10 +167,9 @@ def is_dataset(folder: Path) -> bool:
     file = folder / MANIFEST
     try:
         # A pipe would never end.
-        content = json.loads(file.read_bytes()) if file.is_file() else None
-    except (OSError, ValueError, RecursionError):
+        return file.is_file() and msgspec.json.decode(file.read_bytes(), type=_Head).format == _FORMAT
+    except (OSError, msgspec.DecodeError, RecursionError):
         return False
-    return isinstance(content, dict) and cast(dict[str, object], content).get("format") == _FORMAT
 
 
 def check_path(folder: Path, code: str) -> None:
@@ -187,108 +212,26 @@ def read_manifest(name: str, data: bytes, *, older: bool = False) -> Manifest:
     """
     path = f"{name}/{MANIFEST}"
     try:
-        content = json.loads(data.decode())
-    except UnicodeDecodeError as error:
-        raise _damaged(path, "is not UTF-8 text") from error
-    except (ValueError, RecursionError) as error:
+        head = msgspec.json.decode(data, type=_Head)
+    except msgspec.ValidationError:
+        head = _Head()
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         raise _damaged(path, f"is not JSON: {error}") from error
-    if not isinstance(content, dict) or cast(dict[str, object], content).get("format") != _FORMAT:
+    if head.format != _FORMAT:
         hint = "`scenicq ingest SOURCE DATASET` makes a dataset from a source"
         raise DataError(Diagnostic("store-missing", f"{name} is not a dataset of scenicq", hints=(hint,)))
-    fields = cast(dict[str, Any], content)
-    found = fields.get("schema")
+    found = head.schema
     if found != SCHEMA_VERSION and not (older and found in UPGRADABLE):
         message = f"{name} has tables of version {found}; this program reads version {SCHEMA_VERSION}"
         hint = f"`scenicq index {name}` brings it up to date" if found in UPGRADABLE else "ingest the source again"
         raise DataError(Diagnostic("store-version", message, hints=(hint,)))
     try:
-        return _manifest(fields)
-    except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
-        raise _damaged(path, f"lacks or has an unsound {error}") from error
+        manifest = msgspec.json.decode(data, type=Manifest)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise _damaged(path, f"is unsound: {error}") from error
+    # other tables than those that are known are nobody's
+    return structs.replace(manifest, tables={each: manifest.tables[each] for each in SCHEMAS})
 
 
 def _damaged(path: str, what: str) -> DataError:
     return DataError(Diagnostic("store-damaged", f"{path} {what}", hints=("ingest the source again",)))
-
-
-def _manifest(content: dict[str, Any]) -> Manifest:
-    tables = {name: tuple(_part(part) for part in content["tables"][name]) for name in SCHEMAS}
-    span = content["span_us"]
-    return Manifest(
-        name=_text(content["name"]),
-        importer=_text(content["importer"]),
-        tables=tables,
-        maps=_numbers(content["maps"]),
-        total=_counts(content["total"]),
-        tracks=_whole(content["tracks"]),
-        span_us=None if span is None else (_time(span[0]), _time(span[1])),
-        by_class=_numbers(content["by_class"]),
-        by_source_class=_numbers(content["by_source_class"]),
-        by_map={name: _counts(counts) for name, counts in content["by_map"].items()},
-        by_recording={name: _counts(counts) for name, counts in content["by_recording"].items()},
-        left_out=tuple(_left_out(entry) for entry in content["left_out"]),
-        provenance=_provenance(content["provenance"]),
-        schema=_whole(content["schema"]),
-    )
-
-
-def _part(fields: dict[str, Any]) -> Part:
-    part = Part(**fields)
-    if not _PLAIN.fullmatch(part.path):
-        raise ValueError(f"path {part.path}")
-    _whole(part.bytes)
-    _whole(part.rows)
-    _text(part.sha256)
-    return part
-
-
-def _counts(fields: dict[str, Any]) -> Counts:
-    counts = Counts(**fields)
-    _whole(counts.frames)
-    _whole(counts.objects)
-    return counts
-
-
-def _left_out(fields: dict[str, Any]) -> LeftOut:
-    entry = LeftOut(**fields)
-    for text in (entry.what, entry.code, entry.name):
-        _text(text)
-    _whole(entry.count)
-    if not isinstance(entry.kept, bool):  # pyright: ignore[reportUnnecessaryIsInstance] - a stranger's
-        raise ValueError(f"kept: {entry.kept}")
-    return entry
-
-
-def _provenance(value: Any) -> Mapping[str, Any]:
-    """Anything, but that what messages are made of has the form that they need."""
-    given = cast("dict[str, Any]", value)
-    for key in ("source", "time"):
-        _text(given.get(key, ""))
-    for key in ("versions", "facts"):
-        for name, each in cast("dict[str, Any]", given.get(key) or {}).items():
-            _text(name)
-            if key == "versions":
-                _text(each)
-    return given
-
-
-def _text(value: Any) -> str:
-    if not isinstance(value, str):
-        raise ValueError(f"text: {str(value)[:40]}")
-    return value
-
-
-def _whole(value: Any) -> int:
-    if type(value) is not int or not 0 <= value < _LARGEST:
-        raise ValueError(f"number: {str(value)[:40]}")
-    return value
-
-
-def _time(value: Any) -> int:
-    if type(value) is not int or not -_LARGEST <= value < _LARGEST:
-        raise ValueError(f"time: {str(value)[:40]}")
-    return value
-
-
-def _numbers(value: dict[str, Any]) -> dict[str, int]:
-    return {name: _whole(number) for name, number in value.items()}

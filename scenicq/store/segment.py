@@ -11,7 +11,6 @@ maps; therefore processes write them side by side, and an interrupted or repeate
 from __future__ import annotations
 
 import hashlib
-import json
 import os
 import shutil
 from collections import Counter
@@ -19,13 +18,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
+import msgspec
 import pyarrow as pa
+from msgspec import Struct
 
 from scenicq.store.atomic_files import write_whole
 from scenicq.store.columns import RecordingColumns
-from scenicq.store.manifest import SEGMENTS, Counts, Part, fields_of
+from scenicq.store.manifest import SEGMENTS, Counts, Part, Whole
 from scenicq.store.parquet import TableWriter, part_path
 from scenicq.store.rows import recording_rows
 from scenicq.store.schema import SEGMENT_TABLES, ArrowTable
@@ -51,8 +52,7 @@ SEGMENT_OBJECTS = 1 << 20
 """Upper bound of the label objects of a segment, unless a single recording has more."""
 
 
-@dataclass(frozen=True, slots=True)
-class SourceProblem:
+class SourceProblem(Struct, frozen=True):
     """Something of a source that could not be taken as it is, as the importer's report told it.
 
     Attributes:
@@ -68,8 +68,7 @@ class SourceProblem:
     hints: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class SourceRecording:
+class SourceRecording(Struct, frozen=True):
     """What one recording of the source became.
 
     Attributes:
@@ -79,12 +78,23 @@ class SourceRecording:
     """
 
     fingerprint: str
-    counts: Sequence[tuple[str, str, str, bool, int]] = ()
-    told: Sequence[SourceProblem] = ()
+    counts: tuple[tuple[str, str, str, bool, int], ...] = ()
+    told: tuple[SourceProblem, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class Segment:
+class SegmentFile(Struct, frozen=True, array_like=True):
+    """Size, checksum and rows of a Parquet file."""
+
+    bytes: Whole
+    sha256: str
+    rows: Whole
+
+
+class CountsRow(Counts, frozen=True, array_like=True):
+    """Counts that are written as a pair."""
+
+
+class Segment(Struct, frozen=True):
     """What one segment holds.
 
     Attributes:
@@ -100,15 +110,15 @@ class Segment:
     """
 
     fingerprint: str
-    files: Mapping[str, Part]
-    recordings: Mapping[str, Counts]
-    by_map: Mapping[str, Counts]
-    by_class: Mapping[str, int]
-    by_source_class: Mapping[str, int]
-    tracks: int
+    files: dict[str, SegmentFile]
+    recordings: dict[str, CountsRow]
+    by_map: dict[str, CountsRow]
+    by_class: dict[str, Whole]
+    by_source_class: dict[str, Whole]
+    tracks: Whole
     span_us: tuple[int, int] | None
-    rows: Mapping[str, Sequence[int]] = field(default_factory=dict[str, Sequence[int]])
-    pieces: Mapping[str, SourceRecording] = field(default_factory=dict[str, SourceRecording])
+    rows: dict[str, list[Whole]] = {}
+    pieces: dict[str, SourceRecording] = {}
 
     @property
     def objects(self) -> int:
@@ -182,8 +192,8 @@ class SegmentWriter:
     folder: Path
     number: int
     _tables: dict[str, TableWriter] = field(default_factory=dict[str, TableWriter])
-    _recordings: dict[str, Counts] = field(default_factory=dict[str, Counts])
-    _by_map: dict[str, Counts] = field(default_factory=dict[str, Counts])
+    _recordings: dict[str, CountsRow] = field(default_factory=dict[str, CountsRow])
+    _by_map: dict[str, CountsRow] = field(default_factory=dict[str, CountsRow])
     _by_class: Counter[str] = field(default_factory=Counter[str])
     _by_source_class: Counter[str] = field(default_factory=Counter[str])
     _rows: dict[str, list[int]] = field(default_factory=dict[str, list[int]])
@@ -249,12 +259,12 @@ class SegmentWriter:
         labels, first = rows["labels"], 0
         for name, sizes in recordings.items():
             by_table = dict(zip(SEGMENT_TABLES, sizes, strict=True))
-            counts = Counts(by_table["labels"], by_table["objects"])
+            counts = CountsRow(by_table["labels"], by_table["objects"])
             self._recordings[name] = counts
             self._rows[name] = list(sizes)
             map_name = labels["map"][first].as_py() if counts.frames else ""
-            before = self._by_map.get(map_name, Counts())
-            self._by_map[map_name] = Counts(before.frames + counts.frames, before.objects + counts.objects)
+            before = self._by_map.get(map_name, CountsRow())
+            self._by_map[map_name] = CountsRow(before.frames + counts.frames, before.objects + counts.objects)
             first += counts.frames
         self._by_class += tally.classes
         self._by_source_class += tally.source_classes
@@ -279,7 +289,7 @@ class SegmentWriter:
         """
         segment = Segment(
             fingerprint=fingerprint,
-            files={table: writer.finish() for table, writer in self._tables.items()},
+            files={table: _file(writer.finish()) for table, writer in self._tables.items()},
             recordings=self._recordings,
             by_map=dict(sorted(self._by_map.items())),
             by_class=dict(sorted(self._by_class.items())),
@@ -291,7 +301,7 @@ class SegmentWriter:
         )
         self._tables.clear()
         (self.folder / SEGMENTS).mkdir(exist_ok=True)
-        write_whole(_description(self.folder, self.number), _to_json(segment))
+        write_whole(_description(self.folder, self.number), msgspec.json.encode(segment).decode() + "\n")
         return segment
 
     def abandon(self) -> None:
@@ -308,11 +318,11 @@ def read_segments(folder: Path) -> dict[int, Segment]:
     for path in sorted((folder / SEGMENTS).glob("part-*.json")):
         try:
             number = int(path.stem.removeprefix("part-"))
-            segment = _from_json(json.loads(path.read_bytes()))
+            segment = msgspec.json.decode(path.read_bytes(), type=Segment)
             parts = [segment.part(table, number) for table in SEGMENT_TABLES]
             if all((folder / part.path).stat().st_size == part.bytes for part in parts):
                 found[number] = segment
-        except (OSError, ValueError, TypeError, KeyError, IndexError, AttributeError):
+        except (OSError, ValueError, KeyError, RecursionError, msgspec.DecodeError):
             continue
     return found
 
@@ -355,41 +365,9 @@ def take_over(segment: Segment, source: Path, number: int, target: Path, new_num
             shutil.copyfile(old, new)
 
 
+def _file(part: Part) -> SegmentFile:
+    return SegmentFile(part.bytes, part.sha256, part.rows)
+
+
 def _description(folder: Path, number: int) -> Path:
     return folder / SEGMENTS / f"part-{number:05}.json"
-
-
-def _to_json(segment: Segment) -> str:
-    fields = fields_of(segment)
-    fields["files"] = {name: [part.bytes, part.sha256, part.rows] for name, part in segment.files.items()}
-    for key in ("recordings", "by_map"):
-        fields[key] = {name: [counts.frames, counts.objects] for name, counts in fields[key].items()}
-    return json.dumps(fields, ensure_ascii=False, separators=(",", ":"), default=fields_of) + "\n"
-
-
-def _from_json(fields: dict[str, Any]) -> Segment:
-    span = fields["span_us"]
-    # older segments have one piece for all of their recordings
-    pieces = fields.get("pieces", {"": {**fields, "fingerprint": ""}})
-    return Segment(
-        fingerprint=fields["fingerprint"],
-        files={name: Part("", *fields["files"][name]) for name in SEGMENT_TABLES},
-        recordings={name: Counts(*counts) for name, counts in fields["recordings"].items()},
-        by_map={name: Counts(*counts) for name, counts in fields["by_map"].items()},
-        by_class=fields["by_class"],
-        by_source_class=fields["by_source_class"],
-        tracks=fields["tracks"],
-        span_us=None if span is None else (span[0], span[1]),
-        rows={name: [int(count) for count in rows] for name, rows in fields.get("rows", {}).items()},
-        pieces={name: _piece(entry) for name, entry in pieces.items()},
-    )
-
-
-def _piece(fields: dict[str, Any]) -> SourceRecording:
-    counts = tuple((what, code, name, kept, count) for what, code, name, kept, count in fields["counts"])
-    return SourceRecording(fields["fingerprint"], counts, tuple(_problem(entry) for entry in fields["told"]))
-
-
-def _problem(fields: dict[str, Any]) -> SourceProblem:
-    what, code, name, kept, message = (fields[key] for key in ("what", "code", "name", "kept", "message"))
-    return SourceProblem(what, code, name, kept, message, tuple(fields["hints"]))

@@ -19,7 +19,7 @@ from scenicq.store.atomic_files import write_whole
 from scenicq.store.columns import RecordingColumns, columns_of
 from scenicq.store.frame_index import frame_hashes, index_rows, repeated_rows
 from scenicq.store.labels import Recording
-from scenicq.store.manifest import MANIFEST, Counts, LeftOut, Manifest
+from scenicq.store.manifest import MANIFEST, Counts, LeftOut, Manifest, Provenance
 from scenicq.store.parquet import TableWriter
 from scenicq.store.partial import Partial, check_target
 from scenicq.store.schema import SCHEMAS, SEGMENT_TABLES, ArrowTable
@@ -185,7 +185,7 @@ class DatasetWriter:
         name: str,
         importer: str = "",
         left_out: Iterable[LeftOut] = (),
-        provenance: Mapping[str, Any] | None = None,
+        provenance: Provenance | None = None,
     ) -> Manifest:
         """Write the maps, the index and the manifest, and give the dataset its name.
 
@@ -207,7 +207,7 @@ class DatasetWriter:
                 tables={table: tables[table] for table in SCHEMAS},
                 maps={key: len(self.maps[key]) for key in sorted(self.maps)},
                 left_out=tuple(left_out),
-                provenance=dict(provenance or {}),
+                provenance=provenance or Provenance(),
                 **_totals(segments),
             )
             write_whole(self.folder / MANIFEST, manifest.to_json())
@@ -292,7 +292,11 @@ def _totals(segments: Sequence[Segment]) -> dict[str, Any]:
         by_source_class.update(segment.by_source_class)
         for name, counts in segment.by_map.items():
             by_map[name] = _sum((by_map.get(name, Counts()), counts))
-    by_recording = {name: counts for segment in segments for name, counts in segment.recordings.items()}
+    by_recording = {
+        name: Counts(counts.frames, counts.objects)
+        for segment in segments
+        for name, counts in segment.recordings.items()
+    }
     times = [time for segment in segments for time in segment.span_us or ()]
     return {
         "total": _sum(by_recording.values()),

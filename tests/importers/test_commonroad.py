@@ -95,7 +95,7 @@ def test_which_object_is_the_ego(file: Path, tmp_path: Path, ego: str | None, tr
     assert [entry.name for entry in manifest.left_out if entry.kept and entry.what == "recording"] == (
         ["no ego"] if ego is None else []
     )
-    assert manifest.provenance["facts"]["ego"].startswith({"100": "track"}.get(ego or "", "the vehicle"))
+    assert manifest.provenance.facts["ego"].startswith({"100": "track"}.get(ego or "", "the vehicle"))
 
 
 def test_no_ego_is_no_ego(file: Path, tmp_path: Path) -> None:
@@ -104,7 +104,7 @@ def test_no_ego_is_no_ego(file: Path, tmp_path: Path) -> None:
     assert {label.ego.heading for label in labels} == {None}
     assert all({member.track for member in label.objects} == {"100", "101", "102"} for label in labels)
     dataset = open_dataset(tmp_path / "d")
-    assert dataset.manifest.provenance["facts"]["ego"].startswith("none")
+    assert dataset.manifest.provenance.facts["ego"].startswith("none")
     source = Source("p", "model scenic.domains.driving.model\nego = new Car\nother = new Car\n")
     with pytest.raises(DataError, match="without an ego"):
         list(Query(dataset, source).results())

@@ -10,7 +10,7 @@ from contextlib import ExitStack, closing, nullcontext
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, cast
+from typing import TYPE_CHECKING, Literal
 
 from scenicq.compiler.absent import check_enforced
 from scenicq.compiler.program import compile_scenario
@@ -167,8 +167,8 @@ class Query:
 
     def _check_ego(self) -> None:
         """Refuse to take a stand-in for an ego that the source does not have."""
-        facts = cast("dict[str, object]", self.dataset.manifest.provenance.get("facts") or {})
-        if str(facts.get("ego", "")).startswith("none") and self.options.match.ego == "label":
+        ego = str(self.dataset.manifest.provenance.facts.get("ego", ""))
+        if ego.startswith("none") and self.options.match.ego == "label":
             raise DataError(
                 Diagnostic(
                     "option-invalid",

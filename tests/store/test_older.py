@@ -1,0 +1,51 @@
+"""What an older version wrote is read: a dataset of `sample_data/nuscenes_tiny`, and results on `sample_data/crossroads`."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from scenicq.importers.ingest import ingest
+from scenicq.query.execution.records import json_text
+from scenicq.query.execution.result_files import read_records
+from scenicq.store.dataset import open_dataset
+from scenicq.store.segment import read_segments
+
+OLDER = Path(__file__).with_name("older")
+SAMPLES = Path(__file__).parents[2] / "sample_data"
+
+
+def tables(folder: Path) -> dict[str, bytes]:
+    return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*.parquet"))}
+
+
+def test_a_dataset_is_opened_checked_and_what_it_says_kept():
+    dataset = open_dataset(OLDER / "tiny", check=True)
+    dataset.verify()
+    said = json.loads((OLDER / "tiny" / "dataset.json").read_text())
+    assert json.loads(dataset.manifest.to_json()) == said
+    assert len(list(dataset.labels())) == said["total"]["frames"] == 6
+
+
+def test_index_makes_of_it_what_an_ingest_makes(run, tmp_path):
+    shutil.copytree(OLDER / "tiny", tmp_path / "d")
+    assert run("index", tmp_path / "d").exit_code == 0
+    assert run("info", tmp_path / "d", "--verify").exit_code == 0
+    ingest(SAMPLES / "nuscenes_tiny", tmp_path / "new")
+    assert tables(tmp_path / "d") == tables(tmp_path / "new")
+
+
+def test_its_segments_are_taken_over():
+    (segment,) = read_segments(OLDER / "tiny").values()
+    assert (segment.objects, segment.recordings["scene-0001"].frames, segment.tracks) == (12, 3, 4)
+
+
+@pytest.mark.parametrize("name", ["frames", "intervals"])
+def test_results_are_read_alike_from_all_formats(name):
+    lines, cells, columns = (list(read_records(OLDER / f"{name}.{form}")) for form in ("jsonl", "csv", "parquet"))
+    assert lines == cells == columns
+    written = [json.loads(line) for line in (OLDER / f"{name}.jsonl").read_text().splitlines()]
+    assert [json.loads(json_text(each)) for each in lines] == written
