@@ -16,16 +16,17 @@ import click
 from scenicq.match.verdict import NoMatch
 from scenicq.query.execution.records import record
 from scenicq.query.execution.result_origin import name_origin
-from scenicq.query.execution.results import Result
+from scenicq.query.execution.results import Funnel, Result
 from scenicq.query.execution.run import Query
 from scenicq.store.atomic_files import sole_writer
 
 from .formats import make_writer
+from .main import NOTHING, UNDECIDED
 from .output import ProgressBar, destination, writing
 from .report import count, show_few
 from .sources import sensor_root
 
-__all__ = ["Wanted", "deliver"]
+__all__ = ["Wanted", "deliver", "exit_code"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,3 +131,15 @@ def _kept(results: Iterable[Result], into: list[Result] | None) -> Iterator[Resu
         if into is not None:
             into.append(result)
         yield result
+
+
+def exit_code(funnel: Funnel, limit: int | None = None) -> int:
+    """The exit code of a query: whether something matched, where all that was to be decided is.
+
+    Args:
+        funnel: Its counts.
+        limit: Matches after which it stopped.
+    """
+    if funnel.cut or funnel.unknowns or (limit is not None and funnel.matches >= limit):
+        return UNDECIDED
+    return 0 if funnel.matches else NOTHING

@@ -10,7 +10,7 @@ import click
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.match.matcher import Matcher
-from scenicq.match.verdict import Match
+from scenicq.match.verdict import Match, Unknown
 from scenicq.query.execution.lazy_solver import LazySolver
 from scenicq.query.execution.run import Query
 from scenicq.query.explain.frame_explanation import explain as explain_label
@@ -19,7 +19,7 @@ from scenicq.query.explain.interval_explanation import explain_recording
 from scenicq.store.frame_names import find_recording
 
 from .datasets import open_checked
-from .main import NOTHING
+from .main import NOTHING, UNDECIDED
 from .manual import Manual
 from .match import match
 from .options import ONE_FRAME, SHARED, query_options
@@ -53,7 +53,11 @@ def _recording(query: Query, named: str) -> tuple[str, int | float | None] | Non
         "program about what happens over time the frame in which the interval begins, or the name of a recording, and "
         "after `@` when the interval begins: a timestamp, or the seconds from where the recording begins (`@3.5s`).",
     },
-    exits={0: "the frame or recording matches", 1: "it does not, or that is unknown (with --exit-zero: 0)"},
+    exits={
+        0: "the frame or recording matches",
+        1: "it does not match (with --exit-zero: 0)",
+        3: "that is unknown (with --exit-zero: 0)",
+    },
     topics={"What counts as a match": SHARED},
     epilog="\b\nExamples:\n"
     "  scenicq explain crossing.scenic dataset 1a2b3c\n"
@@ -84,7 +88,7 @@ def explain(
             told = explain_recording(query, solver, *recording)
         say(plain(told.text()))
         if not told.matches and not exit_zero:
-            ctx.exit(NOTHING)
+            ctx.exit(UNDECIDED if told.is_unknown else NOTHING)
         return
     label = query.dataset.label(str(named))
     show_remarks(query, *remarks(query, [label.map]))
@@ -92,10 +96,14 @@ def explain(
         matcher = Matcher(query.compile(label.map)[0], query.options.match, solver)
         explanation = explain_label(matcher, label, formulas=smt2 is not None)
         matches, told = isinstance(explanation.verdict, Match), show_explanation(explanation)
+        unknown = isinstance(explanation.verdict, Unknown)
         if query.is_over_time():
             begun = explain_recording(query, solver, label.recording, label.timestamp_us)
             # without a start, the frame itself is what keeps it from matching
-            matches, told = (begun.matches, begun.text()) if begun.interval is not None else (False, told)
+            if begun.interval is None:
+                matches = False
+            else:
+                matches, unknown, told = begun.matches, begun.is_unknown, begun.text()
     say(plain(told))
     if smt2 is not None:
         try:
@@ -105,7 +113,7 @@ def explain(
         except OSError as error:
             raise DataError(Diagnostic("target-unwritable", f"{smt2} cannot be written: {error.strerror}")) from None
     if not matches and not exit_zero:
-        ctx.exit(NOTHING)
+        ctx.exit(UNDECIDED if unknown else NOTHING)
 
 
 explain.params += [option for option in match.params if option.name in SHARED]

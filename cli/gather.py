@@ -13,10 +13,9 @@ from scenicq.query.execution.question_notes import noted_question
 from scenicq.query.execution.records import IntervalRecord, read_record
 from scenicq.query.execution.result_tables import roles_of
 
-from .deliver import Wanted, deliver
+from .deliver import Wanted, deliver, exit_code
 from .formats import FORMATS, make_writer
-from .main import NOTHING
-from .manual import Manual
+from .manual import OPEN, Manual
 from .output import ProgressBar, choose_format, destination, writing
 from .sources import SENSORS
 
@@ -26,7 +25,7 @@ __all__ = ["gather"]
 @click.command(
     cls=Manual,
     arguments={"FOLDER": "Where `scenicq match --shard` put the pieces."},
-    exits={0: "something matched", 1: "nothing matched (with --exit-zero: 0)"},
+    exits={0: "something matched", 1: "nothing matched (with --exit-zero: 0)", 3: f"{OPEN} (with --exit-zero: 0)"},
     epilog="\b\nExample:\n  scenicq gather pieces -o matches.parquet",
 )
 @click.argument("folder", type=click.Path(path_type=Path))
@@ -38,7 +37,7 @@ __all__ = ["gather"]
 @click.option("--report", metavar="DIR", type=click.Path(path_type=Path),
               help="Write a page with pictures of the matches, too: DIR/index.html.")  # fmt: skip
 @SENSORS
-@click.option("--exit-zero", is_flag=True, help="Exit with 0 also where nothing matches.")
+@click.option("--exit-zero", is_flag=True, help="Exit with 0 also where nothing matches, or something is undecided.")
 @click.pass_context
 def gather(ctx: click.Context, folder: Path, *, format_: str | None, output: Path | None,
            export: tuple[str, Path] | None, report: Path | None, sensors: Path | None,
@@ -58,8 +57,8 @@ def gather(ctx: click.Context, folder: Path, *, format_: str | None, output: Pat
         query.funnel = gathered.funnel
         results = (read_record(each, query.source) for each in gathered.records())
         deliver(query, results, (), Wanted(file, form, export, report, sensors=sensors), ProgressBar(quiet=True))
-    if gathered.funnel.matches == 0 and not exit_zero:
-        ctx.exit(NOTHING)
+    if not exit_zero:
+        ctx.exit(exit_code(gathered.funnel))
 
 
 def _write(gathered: Gathered, file: Path | None, form: str) -> None:

@@ -22,11 +22,11 @@ from scenicq.garbage import seldom_collected
 from scenicq.refusals import refused_by_system
 
 from .interrupts import Interrupts
-from .manual import write_examples, write_exit_codes
+from .manual import OPEN, write_examples, write_exit_codes
 from .report import show
 from .streams import only_results
 
-__all__ = ["COMMANDS", "NOTHING", "cli", "main"]
+__all__ = ["COMMANDS", "NOTHING", "UNDECIDED", "cli", "main"]
 
 COMMANDS = {
     "ingest": "Make a dataset from a source, such as a nuScenes folder.",
@@ -48,8 +48,8 @@ COMMANDS = {
 _MODULES = {"report": "compare"}
 """Modules whose command has another name."""
 
-NOTHING, ERROR, INTERRUPTED = 1, 2, 130
-"""Exit codes besides 0, in the manner of grep."""
+NOTHING, ERROR, UNDECIDED, INTERRUPTED = 1, 2, 3, 130
+"""Exit codes besides 0, in the manner of grep; `UNDECIDED` is of what would be 0 or 1 else."""
 
 _NO_ROOM = {errno.ENOSPC, errno.EFBIG, errno.EIO, getattr(errno, "EDQUOT", errno.ENOSPC)}
 
@@ -89,7 +89,9 @@ class Commands(click.Group):
         """List the subcommands without importing them."""
         with formatter.section("Commands"):
             formatter.write_dl(list(COMMANDS.items()))
-        write_exit_codes(formatter, {0: "something matched, or the command did its work", 1: "nothing matched"})
+        write_exit_codes(
+            formatter, {0: "something matched, or the command did its work", 1: "nothing matched", 3: OPEN}
+        )
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the examples."""
@@ -138,7 +140,8 @@ def _worded_end() -> Generator[None]:
             _interrupted()
         refused = refused_by_system(error)
         show([Diagnostic("resources-exhausted", refused)] if refused else error.diagnostics)
-        raise click.exceptions.Exit(ERROR) from None
+        late = any(each.code == "deadline-passed" for each in error.diagnostics)
+        raise click.exceptions.Exit(UNDECIDED if late else ERROR) from None
     except KeyboardInterrupt:
         _interrupted()
     except BrokenPipeError:

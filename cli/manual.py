@@ -9,9 +9,11 @@ import click
 
 from .streams import only_results
 
-__all__ = ["Manual", "variable_of", "write_examples", "write_exit_codes"]
+__all__ = ["OPEN", "Manual", "variable_of", "write_examples", "write_exit_codes"]
 
 _ALWAYS = {2: "an error, which standard error explains", 130: "interrupted; nothing is left half-written"}
+OPEN = "something is undecided: --deadline or --limit ended the run, or a frame is unknown"
+"""What the exit code of an undecided query means."""
 _AS_IT_IS = "\b\n"
 _DONE = {0: "the command did its work"}
 
@@ -24,7 +26,7 @@ def write_exit_codes(formatter: click.HelpFormatter, exits: Mapping[int, str]) -
         exits: What the codes mean that are not the same for every command.
     """
     with formatter.section("Exit codes"):
-        formatter.write_dl([(str(code), meaning) for code, meaning in {**exits, **_ALWAYS}.items()])
+        formatter.write_dl([(str(code), meaning) for code, meaning in sorted({**exits, **_ALWAYS}.items())])
 
 
 def write_examples(formatter: click.HelpFormatter, epilog: str | None) -> None:

@@ -27,12 +27,12 @@ from scenicq.temporal.interval_options import DEFAULT_GAP_S
 from .advise import advise, is_nearly_empty
 from .combinations import check_combination, check_over_time
 from .datasets import open_checked
-from .deliver import Wanted, deliver
+from .deliver import Wanted, deliver, exit_code
 from .engine import parse_engine
 from .formats import FORMATS, SPREADSHEET_HELP
 from .funnel import show_funnel
-from .main import INTERRUPTS, NOTHING
-from .manual import Manual
+from .main import INTERRUPTS
+from .manual import OPEN, Manual
 from .option_type import OptionType
 from .options import DEFAULTS, TOPICS, option_type, query_options
 from .output import ProgressBar, choose_format
@@ -67,7 +67,7 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
         "SCENARIO": SCENARIO,
         "DATASET": "A folder that `scenicq ingest` made.",
     },
-    exits={0: "something matched", 1: "nothing matched (with --exit-zero: 0)"},
+    exits={0: "something matched", 1: "nothing matched (with --exit-zero: 0)", 3: f"{OPEN} (with --exit-zero: 0)"},
     topics=TOPICS,
     epilog="\b\nExamples:\n"
     "  scenicq match crossing.scenic dataset --tolerance position=0.5,ego.heading=15deg\n"
@@ -152,7 +152,7 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @click.option("--ignore-params", metavar="LIST", help="Global parameters that are not compared.")
 @click.option("--strict", is_flag=True, help="What the program sets and no label has is an error, not a warning; so is "
               "all that `scenicq check` warns of.")
-@click.option("--exit-zero", is_flag=True, help="Exit with 0 also where nothing matches.")
+@click.option("--exit-zero", is_flag=True, help="Exit with 0 also where nothing matches, or something is undecided.")
 @click.option("--summary", is_flag=True, help="Print the summary also where stderr is not a terminal.")
 @click.option("-q", "--quiet", is_flag=True, help="No progress, no summary.")
 @click.pass_context
@@ -286,5 +286,5 @@ def _conclude(
     """Print the summary and choose the exit code."""
     if summary or (sys.stderr.isatty() and not quiet):
         show_funnel(query, elapsed_s, told)
-    if query.funnel.matches == 0 and not exit_zero:
-        ctx.exit(NOTHING)
+    if not exit_zero:
+        ctx.exit(exit_code(query.funnel, query.options.limit))

@@ -107,7 +107,8 @@ def test_a_closed_pipe_is_silent(command, crossroads, scenarios, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "more", [["--limit", "1"], ["--report", "pages", "--near", "2", "-o", "found.jsonl"], ["--jobs", "2"]]
+    "more",
+    [["--limit", "1", "--exit-zero"], ["--report", "pages", "--near", "2", "-o", "found.jsonl"], ["--jobs", "2"]],
 )
 def test_no_library_complains_when_the_process_ends(command, crossroads, scenarios, tmp_path, more):
     """What is kept until the end, such as a connection of DuckDB's, is told of on standard error as leaked."""

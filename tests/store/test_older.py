@@ -1,4 +1,4 @@
-"""What an older version wrote is read: a dataset of `sample_data/nuscenes_tiny`, and results on `sample_data/crossroads`."""
+"""What an older version wrote is read: a dataset of `nuscenes_tiny`, and results on `crossroads`."""
 
 from __future__ import annotations
 

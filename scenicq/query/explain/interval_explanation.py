@@ -62,6 +62,11 @@ class IntervalExplanation:
     example: str = ""
 
     @property
+    def is_unknown(self) -> bool:
+        """Whether it may match."""
+        return self.interval is not None and self.interval.truth not in (TRUE, FALSE)
+
+    @property
     def matches(self) -> bool:
         """Whether it matches."""
         return self.interval is not None and self.interval.truth == TRUE
