@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import Any, TypeVar
@@ -31,7 +30,6 @@ class RowColumns:
         self._metadata = self._file.metadata
         sizes = [self._metadata.row_group(group).num_rows for group in range(self._file.num_row_groups)]
         self._starts = np.cumsum([0, *sizes])
-        self._begins: list[int] = self._starts.tolist()
         leaves = self._metadata.schema
         self._leaf = {leaves.column(number).path: number for number in range(len(leaves))}
         self._texts: dict[tuple[str, int], Any] = {}
@@ -76,12 +74,16 @@ class RowColumns:
         found[found < 0] = len(numbers)
         return found, [*numbers]
 
-    def text(self, name: str, row: int) -> str:
-        """The text in one row."""
-        group = bisect_right(self._begins, row) - 1
-        if (name, group) not in self._texts:
-            self._texts[name, group] = self._read(name, group)
-        return self._texts[name, group][row - self._begins[group]].as_py()
+    def texts(self, name: str, rows: NDArray[np.int64]) -> list[str]:
+        """The texts in some rows, which may be in any order, of a column without null."""
+        order = np.argsort(rows, kind="stable")
+        ordered, found = rows[order], np.empty(len(rows), dtype=object)
+        # a row may be asked for twice
+        for group, part, _ in self._groups(ordered):
+            if (name, group) not in self._texts:
+                self._texts[name, group] = self._read(name, group)
+            found[order[part]] = self._texts[name, group].take(ordered[part] - self._starts[group]).to_pylist()
+        return found.tolist()
 
     def _groups(self, rows: NDArray[np.int64]) -> Iterator[tuple[int, slice, NDArray[np.int64] | slice]]:
         """The groups that have some rows: each with which of them are its own, and their places in it."""

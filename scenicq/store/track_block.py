@@ -309,6 +309,12 @@ class TrackBlock:
             return ("track", names[int(codes[member])])
         return ("object", f"{self.frame(int(self.label_of[member]))}\n{self.id(member)}")
 
+    def keys(self, members: Integers) -> list[TrackKey]:
+        """The tracks of members by their names."""
+        _, firsts, which = np.unique(self.tracks(members), return_index=True, return_inverse=True)
+        known = [self.key(each) for each in members[firsts].tolist()]
+        return [known[each] for each in which.tolist()]
+
     def _names(self) -> tuple[NDArray[np.int64], list[str]]:
         """By label object the number of its track's name, and the names."""
         if self._named is None:
@@ -318,15 +324,19 @@ class TrackBlock:
 
     def id(self, member: int) -> str:
         """The id of a label object."""
-        return self._objects.text("id", int(self._rows[member]))
+        return self._objects.texts("id", self._rows[member : member + 1])[0]
 
     def frame(self, label: int) -> str:
         """The name of a label's frame."""
-        return self._labels.text("frame", self.first_label + label)
+        return self.frames(np.array([label]))[0]
+
+    def frames(self, labels: Integers) -> list[str]:
+        """The names of labels' frames."""
+        return self._labels.texts("frame", self.first_label + labels)
 
     def name(self, recording: int) -> str:
         """The name of a recording."""
-        return self._labels.text("recording", self.first_label + self.runs[recording][0])
+        return self._labels.texts("recording", np.array([self.first_label + self.runs[recording][0]]))[0]
 
     def seconds(self, label: int) -> float:
         """The time of a label since the first of its recording."""

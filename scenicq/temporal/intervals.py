@@ -222,14 +222,13 @@ class IntervalMatcher:
         many = np.bincount(own[fit], minlength=int(own.max()) + 1)
         alone = np.flatnonzero(fit & (many[own] == 1))
         several = np.flatnonzero(fit & (many[own] > 1))
-        several = several[np.lexsort((starts[several], own[several]))]
-        kept = [alone]
-        for group in np.split(several, np.flatnonzero(np.diff(own[several])) + 1) if len(several) else ():
-            mine = group if len(self.outcomes) == 1 else _surest(group, starts, ends, truth)
-            kept.append(
-                mine[chosen(starts[mine], ends[mine], truth[mine], lasting[mine], self.options.intervals, least)]
-            )
-        told = self._verdicts(found.some(np.concatenate(kept)), table, order)
+        shift = _one_after_the_other(own[several], starts[several], ends[several])
+        first, last = starts[several] + shift, ends[several] + shift
+        if len(self.outcomes) > 1:
+            surest = _surest(first, last, truth[several])
+            several, first, last = several[surest], first[surest], last[surest]
+        kept = several[chosen(first, last, truth[several], lasting[several], self.options.intervals, least)]
+        told = self._verdicts(found.some(np.concatenate((alone, kept))), table, order)
         # what was cut off might have matched; else what was matched but is too short, else what came furthest
         open_ = np.flatnonzero(many[own] == 0)
         broken = cast("list[Span | None]", found.broken[open_].tolist())
@@ -250,8 +249,7 @@ class IntervalMatcher:
         recordings = block.recording_of[runs.starts]
         firsts = np.array([first for first, _ in block.runs], dtype=np.int64)[recordings]
         tracks = [
-            [(index, block.key(each)) for each in members[runs.of].tolist()]
-            for index, members in sorted(table.members.items())
+            [(index, key) for key in block.keys(members[runs.of])] for index, members in sorted(table.members.items())
         ]
         columns = (runs.starts - firsts, runs.ends - firsts, runs.truth, recordings, order[runs.of], runs.cut_off)
         outcomes = [self.outcomes[each] for each in cast("list[int]", table.outcomes[runs.of].tolist())]
@@ -273,13 +271,30 @@ class IntervalMatcher:
         return found
 
 
-def _surest(
-    mine: NDArray[np.int64], starts: NDArray[np.int64], ends: NDArray[np.int64], truth: Truth
+def _one_after_the_other(
+    own: NDArray[np.int64], starts: NDArray[np.int64], ends: NDArray[np.int64]
 ) -> NDArray[np.int64]:
+    """By how much to shift intervals so that those of one binding lie behind those of another.
+
+    Args:
+        own: The binding of each.
+        starts: First samples.
+        ends: Last samples.
+    """
+    _, which = np.unique(own, return_inverse=True)
+    count = int(which.max(initial=-1)) + 1
+    low, high = np.full(count, np.iinfo(np.int64).max), np.zeros(count, np.int64)
+    np.minimum.at(low, which, starts)
+    np.maximum.at(high, which, ends)
+    sizes = high - low + 1
+    return (np.cumsum(sizes) - sizes - low)[which]
+
+
+def _surest(starts: NDArray[np.int64], ends: NDArray[np.int64], truth: Truth) -> NDArray[np.int64]:
     """The numbers of runs without those that another outcome makes as sure at least, from one sample to another."""
-    ordered = mine[np.lexsort((-truth[mine].astype(np.int64), ends[mine], starts[mine]))]
+    ordered = np.lexsort((-truth.astype(np.int64), ends, starts))
     same = (starts[ordered][1:] == starts[ordered][:-1]) & (ends[ordered][1:] == ends[ordered][:-1])
-    return ordered[np.concatenate(([True], ~same))]
+    return ordered[np.concatenate(([True], ~same))] if len(ordered) else ordered
 
 
 def _sorted(table: StartTable) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -1,4 +1,4 @@
-"""Which of the intervals of one binding are reported."""
+"""Which intervals are reported."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def chosen(
 ) -> NDArray[np.int64]:
     """The numbers of the intervals to report, in order of time.
 
-    One that is not sure counts only where no match overlaps it.
+    One that is not sure counts only where no match overlaps it. Intervals of several bindings lie one after the other.
 
     Args:
         starts: First samples.

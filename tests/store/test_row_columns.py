@@ -40,5 +40,7 @@ def test_some_rows_are_those_of_the_whole(tmp_path, seed):
         reals = np.array([np.nan if each is None else each for each in expected["real"]], np.float64)
         assert columns.numbers("real", rows).tobytes() == reals.tobytes()
         assert columns.integers("whole", rows).tolist() == expected["whole"]
-        assert [columns.text("text", row) for row in rows.tolist()] == expected["text"]
+        assert columns.texts("text", rows) == expected["text"]
+        mixed = draw.choices(range(len(rows)), k=2 * len(rows)) if len(rows) else []
+        assert columns.texts("text", rows[np.array(mixed, np.int64)]) == [expected["text"][place] for place in mixed]
     columns.close()

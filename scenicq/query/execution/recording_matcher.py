@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -298,10 +299,29 @@ class RecordingMatcher:
     ) -> Iterator[tuple[int, Result]]:  # fmt: skip
         """Intervals as results, with the recordings that they are of."""
         witnesses = self._witnesses(intervals if self.proofs else (), starts, remember)
-        for each in intervals:
-            start = starts.decided.get(each.origin)
-            reason = start.verdict.reason if start is not None and isinstance(start.verdict, Unknown) else ""
-            yield each.recording, self._result(block, each, witnesses.get(each.origin, {}), each.reason or reason)
+        scenario = self.matcher.scenario
+        open_ended = scenario.dynamics is None or not scenario.dynamics.terminates
+        recordings = np.array([each.recording for each in intervals], dtype=np.int64)
+        firsts = np.array([first for first, _ in block.runs], dtype=np.int64)[recordings]
+        first = firsts + np.array([each.start for each in intervals], dtype=np.int64)
+        last = firsts + np.array([each.end for each in intervals], dtype=np.int64)
+        names = {each: block.name(each) for each in cast("list[int]", np.unique(recordings).tolist())}
+        objects = [owner.name for owner in scenario.objects]
+        start_us, end_us = (cast("list[int]", block.times_us[labels].tolist()) for labels in (first, last))
+        rows = zip(intervals, block.frames(first), block.frames(last), start_us, end_us, strict=True)
+        for each, frame, last_frame, begins_us, ends_us in rows:
+            roles = {objects[index]: _named(track) for index, track in each.binding}
+            verdict: Verdict
+            if each.truth == TRUE:
+                verdict = Match(roles, {**witnesses.get(each.origin, {}), **each.witness})
+            elif each.truth == UNKNOWN:
+                start = starts.decided.get(each.origin)
+                unsure = start.verdict.reason if start is not None and isinstance(start.verdict, Unknown) else ""
+                verdict = Unknown(each.reason or unsure, Cause("over time"), roles)
+            else:
+                verdict = NoMatch(_cause(block.seconds(block.runs[each.recording][0] + each.end), each), roles)
+            span = IntervalSpan(last_frame, ends_us, each.end - each.start + 1, open_ended)
+            yield each.recording, Result(frame, names[each.recording], begins_us, verdict, interval=span)
 
     def _witnesses(
         self, intervals: Sequence[IntervalVerdict], starts: _Starts, remember: Callable[[int], Remembered]
@@ -321,27 +341,6 @@ class RecordingMatcher:
             labels = [(remember(each)[0], among) for each in numbers]
             verdicts.update(zip(numbers, self._search_of(outcome).rest.match_all(labels), strict=True))
         return {number: each.witness for number, each in verdicts.items() if isinstance(each, Match)}
-
-    def _result(
-        self, block: TrackBlock, interval: IntervalVerdict, witness: Mapping[str, WitnessValue], reason: str
-    ) -> Result:
-        """An interval as a result."""
-        scenario = self.matcher.scenario
-        roles = {scenario.objects[index].name: _named(track) for index, track in interval.binding}
-        first, _ = block.runs[interval.recording]
-        start, end = first + interval.start, first + interval.end
-        verdict: Verdict
-        if interval.truth == TRUE:
-            verdict = Match(roles, {**witness, **interval.witness})
-        elif interval.truth == UNKNOWN:
-            verdict = Unknown(reason, Cause("over time"), roles)
-        else:
-            verdict = NoMatch(_cause(block.seconds(end), interval), roles)
-        dynamics = scenario.dynamics
-        open_ended = dynamics is None or not dynamics.terminates
-        span = IntervalSpan(block.frame(end), int(block.times_us[end]), end - start + 1, open_ended)
-        name = block.name(interval.recording)
-        return Result(block.frame(start), name, int(block.times_us[start]), verdict, interval=span)
 
 
 def _objects_of(block: TrackBlock, labels: NDArray[np.int64]) -> NDArray[np.int64]:
