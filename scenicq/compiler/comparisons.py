@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from typing import cast
 
 from scenicq.compiler import operators
@@ -123,6 +124,15 @@ def _compare_known(op: str, left: ModelValue, right: ModelValue, span: Span) -> 
             return (left is right) == (op == "==")
         if isinstance(left, Instance) and isinstance(right, Instance):
             return (left is right) == (op == "==")
+        if isinstance(left, list | tuple) and isinstance(right, list | tuple):
+            one, other = (list(cast("Sequence[ModelValue]", each)) for each in (left, right))
+            nested = any(isinstance(each, list | tuple | dict | set) for each in one + other)
+            if not nested and any(map(_is_special, one + other)):
+                equal = type(left) is type(right) and len(one) == len(other)
+                same = _all_equal(one, other, span) if equal else False
+                if isinstance(same, bool):
+                    return same == (op == "==")
+                return same if op == "==" else operators.combine("not", [same], span)
     if is_node(left) or is_node(right):
         return operators.compare(op, left, right, span)
     return plain_binary(op, left, right, span)
@@ -181,6 +191,14 @@ def _any_equal(left: ModelValue, items: list[ModelValue], span: Span) -> ModelVa
     if True in known or not any(map(is_random, known)):
         return True in known
     return operators.combine("or", known, span)
+
+
+def _all_equal(left: list[ModelValue], right: list[ModelValue], span: Span) -> ModelValue:
+    compared = [compare("==", one, other, span) for one, other in zip(left, right, strict=True)]
+    known = [each.value if isinstance(each, Constant) else each for each in compared]
+    if False in known or not any(map(is_random, known)):
+        return False not in known
+    return operators.combine("and", [each for each in known if is_random(each)], span)
 
 
 def iterate(value: ModelValue, span: Span) -> list[ModelValue]:

@@ -96,3 +96,23 @@ def test_known_vectors_in_lists() -> None:
     assert value("(1, 2) in [(1, 2), (3, 4)]") is True
     assert value("(1, 3) in [(1, 2), (3, 4)]") is False
     assert value("ego.position in [(3, -4)]") is True
+
+
+@pytest.mark.parametrize(
+    ("condition", "holds"),
+    [
+        ("(ego.width, o.width) == (1, 1)", True),
+        ("[ego.position.x > 5, 1] == [False, 1]", True),
+        ("(ego.position.x, 0) == (3, 0)", False),
+        ("(ego.position.x, 0) != (3, 0)", True),
+        ("(ego.position.x, 0) == (0, 0)", True),
+        ("not (ego.position.x, o.position.x) != (0, 7)", True),
+        ("not ((ego.position.x, 0) == [0, 0]) and not ((ego.position.x, 0) == (0,))", True),
+        ("(ego.position.x, 'a') == (0, 'b')", False),
+    ],
+)
+def test_lists_that_hold_what_a_scene_says_are_compared_item_by_item(condition: str, holds: bool) -> None:
+    objects = "ego = new Object at (Range(-9, 9), 0)\no = new Object at (Range(-9, 9), 5)\n"
+    scenario = compiled(f"{objects}require {condition} or o.position.x > 8\n")
+    found = Matcher(scenario, MatchOptions(tolerance=EXACT)).match(label((0.0, 0.0, 0.0), (7.0, 5.0, 0.0)))
+    assert isinstance(found, Match if holds else NoMatch)
