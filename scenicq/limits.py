@@ -224,6 +224,9 @@ class Limits:
         "below which an interval of the number that parts share is not divided any more",
         "nonlinear",
     )
+    pruned_boxes: int = _otherwise(
+        4096, "boxes", "that a group is divided into, of which something is left", "a solver is asked"
+    )
     narrowing_passes: int = _coarser(
         6, "passes", "in which the ranges of random variables are narrowed", "the ranges stay wider"
     )

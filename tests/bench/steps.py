@@ -38,7 +38,7 @@ from scenes import STREET, compiled, drawn, label_of  # noqa: E402
 from scenicq.forest.scenario import Scenario  # noqa: E402
 from scenicq.geometry.network import Network, read_geojson  # noqa: E402
 from scenicq.match.decide import cascade, decomposition  # noqa: E402
-from scenicq.match.fields import field_solver  # noqa: E402
+from scenicq.match.fields import branch_and_prune, field_solver  # noqa: E402
 from scenicq.match.linear.affine_reach import Reach  # noqa: E402
 from scenicq.match.matcher import Matcher  # noqa: E402
 from scenicq.match.options import MatchOptions  # noqa: E402
@@ -137,6 +137,9 @@ STEPS: dict[str, Off] = {
     "decomposition": _set(group_cache, "decide_decomposed", cascade.decide),
     "choice search": _set(group_cache, "decide_with_choices", lambda *_: None),
     "areas of hidden distances": _set(decomposition, "with_areas", lambda *_, **__: None),
+    "branch and prune": _set(
+        branch_and_prune, "branch_and_prune", lambda items, _: Undecided(items[0][0], "switched off")
+    ),
     "trial": _set(field_solver, "find_witness", lambda *_, **__: None),
     "heading propagation": _set(field_solver, "decide_directions", _undecided),
     "parts by a shared number": _set(decomposition, "_shared", lambda *_: None),

@@ -7,13 +7,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from left_to_solvers import leave_to_solvers
 from programs import HEADER, PROGRAMS
 from scenes import compiled, drawn, label_of
 
 from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.scenario import BuiltIn
 from scenicq.match.decide import solver_step
-from scenicq.match.fields import witness_search
 from scenicq.match.linear import linear_program
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
@@ -220,8 +220,8 @@ def test_a_requirement_that_is_only_probable_excludes_nothing():
 
 @pytest.fixture
 def no_search(monkeypatch):
-    """No search for witnesses, which finds one before a solver is asked."""
-    monkeypatch.setattr(witness_search, "search_witness", lambda *_, **__: None)
+    """Nothing of our own decides before a solver is asked."""
+    leave_to_solvers(monkeypatch)
 
 
 # --- unknown never becomes no

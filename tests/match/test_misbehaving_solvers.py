@@ -12,14 +12,14 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from left_to_solvers import leave_to_solvers
 
-from scenicq.match.fields import witness_search
 from scenicq.smt import pool, solver
 from scenicq_cli.main import cli
 
 HERE = Path(__file__).parent
 
-# The angle is hidden and turns both the place and the heading: no step before the solver decides that.
+# The angle is hidden and turns both the place and the heading: no linear program decides that.
 PROGRAM = """
 model scenic.domains.driving.model
 angle = Range(-60, 60) deg
@@ -31,9 +31,9 @@ other = new Car offset along angle relative to ego.heading by (Range(-6, 6), Ran
 
 @pytest.fixture(autouse=True, scope="module")
 def no_search():
-    """No search for witnesses, which finds one before a solver is asked."""
+    """Nothing of our own decides before a solver is asked."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(witness_search, "search_witness", lambda *_, **__: None)
+        leave_to_solvers(patch)
         yield
 
 

@@ -22,9 +22,14 @@ from scenicq.forest.nodes import (
     Compare,
     CompareOp,
     Constant,
+    Contains,
     Coordinate,
     DirectionAt,
+    DiscreteRange,
+    Distance,
+    Encloses,
     Identity,
+    Intersects,
     Leaf,
     Node,
     Norm,
@@ -34,6 +39,7 @@ from scenicq.forest.nodes import (
     Scale,
     Select,
     TruncatedNormal,
+    Undefined,
     Value,
     VectorOf,
     VectorSum,
@@ -61,6 +67,7 @@ from scenicq.match.fields.interval_domain import (
     wrapped,
 )
 from scenicq.match.fields.interval_functions import PARTIAL, arguments_of, range_of
+from scenicq.match.fields.region_bounds import distance_between, places_of
 from scenicq.match.problem.conditioned import Item
 from scenicq.match.tolerance import ROUNDING, SLACK
 
@@ -235,6 +242,8 @@ class BoxSet:
                 return wrapped(angle_of(self._vector(node.vector)))
             case Norm():
                 return lengths(self._vector(node.vector))
+            case Distance():
+                return distance_between(node.region, self._vector(node.point))
             case DirectionAt():
                 chosen = self.chosen.get(id(node))
                 # one direction of a field is off by rounding from cell to cell
@@ -249,6 +258,8 @@ class BoxSet:
     def _support(self, leaf: Leaf) -> Enclosure:
         """Where a random variable is, as far as it is known and its parameters allow."""
         own = self.ranges[leaf.identity]
+        if isinstance(leaf, DiscreteRange):
+            return np.stack([np.ceil(own[0] - ROUNDING), np.floor(own[1] + ROUNDING)])
         if not isinstance(leaf, Range | TruncatedNormal) or _is_known(leaf):
             return own
         low, high = [self._scalar(end) for end in (leaf.low, leaf.high)]
@@ -273,8 +284,15 @@ class BoxSet:
     def _compare(self, item: Item) -> None:
         constraint, node, seen = item
         if not isinstance(constraint, Comparison):
-            for part in conjuncts(node):
-                self._hold(part)
+            todo = [(node, np.ones(self.size, dtype=bool))]
+            while todo:
+                whole, where = todo.pop()
+                for part in conjuncts(whole):
+                    chosen = self.chosen.get(id(part.index)) if isinstance(part, Select) else None
+                    if isinstance(part, Select) and chosen is not None:
+                        todo += [(option, where & (chosen == number)) for number, option in enumerate(part.options)]
+                    else:
+                        self._hold(part, where)
         elif isinstance(seen, tuple) and constraint.property == "position":
             margin = self.network.tolerance.of(constraint.object, "position")
             a, b = margin.size + SLACK, margin.y + SLACK
@@ -286,7 +304,8 @@ class BoxSet:
             allowed = self.network.tolerance.of(constraint.object, constraint.property).size + SLACK
             self._meet(node, np.array([[seen - allowed], [seen + allowed]]))
 
-    def _hold(self, node: Node) -> None:
+    def _hold(self, node: Node, where: NDArray[np.bool_]) -> None:
+        """Have a condition hold in some of the cases, (n,)."""
         match node:
             case Compare():
                 left, right = self._scalar(node.left), self._scalar(node.right)
@@ -294,15 +313,26 @@ class BoxSet:
                     return
                 # floating point makes the comparison, after which one side may be beyond the other by rounding
                 left, right = left + _OFF, right + _OFF
-                low, high = np.full(self.size, -np.inf), np.full(self.size, np.inf)
                 if node.op in (CompareOp.LT, CompareOp.LE, CompareOp.EQ):
-                    self._meet(node.left, np.stack([low, right[1]]))
-                    self._meet(node.right, np.stack([left[0], high]))
+                    self._order(node.left, left, node.right, right, where)
                 if node.op in (CompareOp.GT, CompareOp.GE, CompareOp.EQ):
-                    self._meet(node.left, np.stack([right[0], high]))
-                    self._meet(node.right, np.stack([low, left[1]]))
+                    self._order(node.right, right, node.left, left, where)
+            case Constant(value=False | Undefined()):
+                self._refuse(node, where)
+            case Contains() | Intersects() | Encloses():
+                for point, place in places_of(node, self._vector, self._scalar):
+                    self._meet(point, np.where(where, place, everything(place)))
             case _:
                 pass
+
+    def _order(self, below: Node, low: Enclosure, above: Node, high: Enclosure, where: NDArray[np.bool_]) -> None:
+        """Have one number be at most another one in some of the cases."""
+        self._meet(below, np.stack([np.full(self.size, -np.inf), np.where(where, high[1], np.inf)]))
+        self._meet(above, np.stack([np.where(where, low[0], -np.inf), np.full(self.size, np.inf)]))
+
+    def _refuse(self, node: Node, where: NDArray[np.bool_]) -> None:
+        """Have nothing left in some of the cases."""
+        self._meet(node, np.where(where, [[np.inf], [-np.inf]], [[-np.inf], [np.inf]]))
 
     def _backward(self, node: Node) -> None:
         own = self._bounds.get(id(node))
@@ -341,6 +371,9 @@ class BoxSet:
                     args = [self._scalar(arg) for arg in node.args]
                     for arg, found in zip(node.args, arguments_of(node.op, own, args), strict=False):
                         self._meet(arg, found)
+            case Select() if id(node.index) in self.chosen:
+                for number, option in enumerate(node.options):
+                    self._meet(option, np.where(self.chosen[id(node.index)] == number, own, everything(own)))
             case _ if is_leaf(node):
                 identity = cast(Leaf, node).identity
                 self.ranges[identity] = self._bounds[id(node)] = common(own, self.ranges[identity])

@@ -24,7 +24,7 @@ from scenicq.limits import LIMITS, exhausted
 from scenicq.match.fields.cell_assignment import MARGIN, SAME
 from scenicq.match.fields.contractor import BoxSet
 
-__all__ = ["bisected", "directed", "propagated"]
+__all__ = ["bisected", "branch", "directed", "propagated"]
 
 _AT_ONCE = 256
 """Cases that are narrowed together: what one of them finds may make the others needless."""
@@ -97,6 +97,16 @@ def bisected(cases: BoxSet, below: Sequence[Leaf]) -> list[BoxSet]:
     if found is None or found[0] <= LIMITS.heading_width:
         raise exhausted("heading_width")
     return _halves(cases, *found[1:])
+
+
+def branch(cases: BoxSet) -> list[BoxSet]:
+    """The cases in parts: by a choice that is left to make, else by the widest range.
+
+    Raises:
+        Exhausted: They are too small for either.
+    """
+    parts = _parted(cases)
+    return bisected(cases, [*cases.network.leaves.values()]) if parts is None else parts
 
 
 def _widest(cases: BoxSet, below: Sequence[Leaf]) -> tuple[float, Identity, int] | None:

@@ -126,21 +126,20 @@ class GroupCache:
         return at_last([items]) if isinstance(outcome, Undecided) and not _is_postponed(outcome) else outcome
 
     def _searched(self, items: Sequence[Sequence[Item]]) -> Outcome:
-        """What a search for a witness finds; where fields are, there was one already."""
+        """What comes of boxes; where fields are, these were looked at already."""
         flat = [item for group in items for item in group]
-        doubt = Undecided(flat[0][0], "nonlinear")
         if uses_field(flat):
-            return doubt
-        from scenicq.match.fields.witness_search import THOROUGH, search_witness  # noqa: PLC0415 - takes long to load
+            return Undecided(flat[0][0], "nonlinear")
+        from scenicq.match.fields.branch_and_prune import branch_and_prune  # noqa: PLC0415 - takes long to load
 
-        return search_witness(flat, self.options.tolerance, THOROUGH) or doubt
+        return branch_and_prune(flat, self.options.tolerance)
 
     def _at_last(self, items: Sequence[Sequence[Item]]) -> Outcome:
-        """What nothing else decides: a search for a witness, then the solver."""
+        """What nothing else decides: branch and prune, then the solver."""
         if self.patience is Patience.LITTLE:
             return Undecided(items[0][0][0], POSTPONED)
         found = self._searched(items)
-        return found if isinstance(found, Satisfied) else self.ask(items)
+        return self.ask(items) if isinstance(found, Undecided) else found
 
 
 def _is_postponed(outcome: Outcome) -> bool:

@@ -17,24 +17,11 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 from exact_values import LARGEST, Exact, exact_values, parts_of
+from random_expressions import random_expression, random_number
 
 from scenicq.forest import build
 from scenicq.forest.groups import Condition
-from scenicq.forest.nodes import (
-    Arithmetic,
-    ArithmeticOp,
-    Bearing,
-    Compare,
-    CompareOp,
-    Coordinate,
-    Node,
-    Norm,
-    Normal,
-    Rotate,
-    Scale,
-    VectorOf,
-    VectorSum,
-)
+from scenicq.forest.nodes import Compare, CompareOp, Node, Normal
 from scenicq.forest.scenario import Requirement
 from scenicq.match.fields import interval_domain
 from scenicq.match.fields.constraint_network import ConstraintNetwork
@@ -45,48 +32,6 @@ WIDTH = 32
 """Boxes of one expression that are narrowed together."""
 HUGE = 1e9
 """Numbers of this size are apart by more than any slack of a comparison."""
-RATIONAL = (ArithmeticOp.ADD, ArithmeticOp.SUB, ArithmeticOp.MUL, ArithmeticOp.DIV, ArithmeticOp.NEG, ArithmeticOp.ABS)
-OTHER = tuple(op for op in ArithmeticOp if op not in RATIONAL)
-PAIRS = {
-    ArithmeticOp.ADD, ArithmeticOp.SUB, ArithmeticOp.MUL, ArithmeticOp.DIV, ArithmeticOp.MIN, ArithmeticOp.MAX,
-    ArithmeticOp.ATAN2, ArithmeticOp.FLOORDIV, ArithmeticOp.MOD,
-}  # fmt: skip
-
-
-def _number(rng: random.Random, size: float) -> float:
-    """A number that may be round, tiny, or of the size of the others."""
-    match rng.randrange(6):
-        case 0:
-            return float(rng.choice((0, 1, -1, 2, 0.5, 3, -10)))
-        case 1:
-            return rng.uniform(-1, 1) * 10.0 ** rng.randrange(-20, 3)
-        case _:
-            return rng.uniform(-size, size)
-
-
-def _scalar(rng: random.Random, scalars: list[Node], vectors: list[Node], ops: tuple[ArithmeticOp, ...]) -> Node:
-    if rng.random() < 0.3:
-        vector = rng.choice(vectors)
-        return rng.choice([Norm(vector), Bearing(vector), Coordinate(vector, rng.randrange(2))])
-    op = rng.choice(ops)
-    if op is ArithmeticOp.POW:
-        exponent = float(rng.choice((0, 1, 2, 3, 4, -1, -2, 0.5, 1.5, -0.7)))
-        return Arithmetic(op, (rng.choice(scalars), build.constant(exponent)))
-    return Arithmetic(op, tuple(rng.choice(scalars) for _ in range(2 if op in PAIRS else 1)))
-
-
-def _expression(rng: random.Random, leaves: list[Node]) -> Node:
-    """A random number over the leaves, of which several operations may share parts."""
-    scalars = [*leaves, build.constant(_number(rng, 10.0))]
-    vectors: list[Node] = [VectorOf(rng.choice(scalars), rng.choice(scalars)) for _ in range(2)]
-    ops = RATIONAL if rng.random() < 0.5 else RATIONAL + OTHER
-    for _ in range(rng.randrange(1, 8)):
-        u, v, a = rng.choice(vectors), rng.choice(vectors), rng.choice(scalars)
-        if rng.random() < 0.6:
-            scalars.append(_scalar(rng, scalars, vectors, ops))
-        else:
-            vectors.append(rng.choice([VectorSum(u, v), Scale(u, a), Rotate(u, a), VectorOf(a, rng.choice(scalars))]))
-    return _scalar(rng, scalars[-3:], vectors[-2:], ops)
 
 
 def _box(rng: random.Random, value: float) -> tuple[float, float]:
@@ -111,10 +56,10 @@ def attempt(seed: int) -> int:
     rng = random.Random(seed)
     leaves: list[Node] = [Normal(build.constant(0.0), build.constant(1.0)) for _ in range(3)]
     target = Normal(build.constant(0.0), build.constant(1.0))
-    root = _expression(rng, leaves)
+    root = random_expression(rng, leaves)
     condition = Compare(CompareOp.EQ, root, target)
     size = rng.choice((3.0, 100.0, HUGE))
-    points = [[_number(rng, size) for _ in leaves] for _ in range(WIDTH)]
+    points = [[random_number(rng, size) for _ in leaves] for _ in range(WIDTH)]
     tried, values, boxes = [], [], []
     for numbers in points:
         given = {leaf.identity: (Fraction(each),) * 2 for leaf, each in zip(leaves, numbers, strict=True)}

@@ -9,6 +9,7 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from left_to_solvers import leave_to_solvers
 
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import ScenarioError, Source
@@ -17,7 +18,6 @@ from scenicq.geometry.membership import contains
 from scenicq.geometry.network import Network
 from scenicq.importers.base import read_maps
 from scenicq.importers.report import Report
-from scenicq.match.fields import witness_search
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import EXACT, parse_tolerance
@@ -164,8 +164,7 @@ ego = new Thing with pace k * a * b * c, with drive k + a * b - b * c, with thir
 def test_what_is_left_of_an_option_goes_to_a_solver_where_nothing_else_decides_it(
     chosen: float, option: float | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # a search for a witness finds one of most of these
-    monkeypatch.setattr(witness_search, "search_witness", lambda *_, **__: None)
+    leave_to_solvers(monkeypatch)
     a, b, c = 1.3, 1.7, 1.1
     shown = {"pace": chosen * a * b * c, "drive": chosen + a * b - b * c, "third": a * a * b + c * chosen}
     ego = LabelObject("ego", "Object", "thing", 0.0, 0.0, heading=0.0, attributes=shown)
