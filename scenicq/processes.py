@@ -13,7 +13,7 @@ import signal
 import sys
 import threading
 from collections import deque
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Callable, Generator, Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import islice
 from types import ModuleType, TracebackType
@@ -24,10 +24,23 @@ from scenicq.garbage import seldom_collected
 from scenicq.refusals import refused_by_system
 
 if TYPE_CHECKING:  # whoever starts no process need not load what starts them
+    import subprocess
     from multiprocessing.connection import Connection
     from multiprocessing.context import SpawnProcess
 
-__all__ = ["Lost", "Work", "Workers", "as_many_as_pay", "discard_output", "lead_output_away", "processors"]
+__all__ = [
+    "Lost",
+    "Work",
+    "Workers",
+    "as_many_as_pay",
+    "discard_output",
+    "end_group",
+    "ended_after",
+    "lead_output_away",
+    "leashed",
+    "limit_memory",
+    "processors",
+]
 
 Task = TypeVar("Task")
 Answer = TypeVar("Answer")
@@ -41,6 +54,9 @@ _AT_MOST = 8
 """Processes where nobody says how many: each may take some 300 MB."""
 _END_S = 2.0
 """Seconds that a worker has to end by itself."""
+_LEASHED = """(read -r word < "/dev/fd/$1"; kill -s KILL -- "-$$") < /dev/null > /dev/null 2>&1 &
+shift; exec "$@\""""
+"""A shell script that becomes a command, whose process group is killed when the other end of a pipe is closed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -336,6 +352,72 @@ def discard_output() -> Generator[None]:
     finally:
         os.dup2(before, 1)
         os.close(before)
+
+
+@contextlib.contextmanager
+def ended_after(process: subprocess.Popen[bytes], seconds: float) -> Generator[threading.Event]:
+    """End a process with its group if the block takes longer; the event says whether it did.
+
+    Args:
+        process: It leads a process group.
+        seconds: By the wall.
+    """
+    expired = threading.Event()
+    timer = threading.Timer(seconds, lambda: (expired.set(), end_group(process)))
+    timer.daemon = True
+    timer.start()
+    try:
+        yield expired
+    finally:
+        timer.cancel()
+
+
+def end_group(process: subprocess.Popen[bytes]) -> None:
+    """Kill a process that leads a process group, with the group."""
+    if process.poll() is not None:
+        return
+    if hasattr(os, "killpg"):
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            os.killpg(process.pid, signal.SIGKILL)
+    else:
+        process.kill()
+
+
+@contextlib.contextmanager
+def leashed(words: Sequence[str]) -> Generator[tuple[Sequence[str], tuple[int, ...]]]:
+    """Have a command be killed with its process group when the block or this process ends, however it ends.
+
+    Args:
+        words: The command.
+
+    Yields:
+        The words to run in place of the command's, and the descriptors to pass.
+    """
+    if not hasattr(os, "killpg"):
+        yield words, ()
+        return
+    theirs, ours = os.pipe()
+    try:
+        yield ["/bin/sh", "-c", _LEASHED, "sh", str(theirs), *words], (theirs,)
+    finally:
+        os.close(ours)
+        os.close(theirs)
+
+
+def limit_memory(size: int, process: int = 0) -> None:
+    """Limit the address space of a process and of all that it starts; a limit that is lower stays.
+
+    Args:
+        size: Bytes.
+        process: Its number; this one by default.
+    """
+    if sys.platform != "linux":
+        return
+    import resource  # noqa: PLC0415 - not everywhere
+
+    before = resource.prlimit(process, resource.RLIMIT_AS)
+    least = min([size, *(limit for limit in before if limit != resource.RLIM_INFINITY)])
+    resource.prlimit(process, resource.RLIMIT_AS, (least, least))
 
 
 def processors() -> int:

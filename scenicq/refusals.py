@@ -6,11 +6,10 @@ Whoever words an error otherwise, as a file that is missing, need not ask: what 
 from __future__ import annotations
 
 import errno
-import sys
 
 from scenicq.errors import ScenicqError
 
-__all__ = ["limit_memory", "refused_by_system"]
+__all__ = ["refused_by_system"]
 
 _TEXTS = {
     "memory": ("out of memory", "cannot allocate memory", "bad_alloc", "failed to map segment", "unable to allocate"),
@@ -70,22 +69,6 @@ def _named_limit(kind: str) -> str:
     name, letter, unit = _LIMITS[kind]
     limit = resource.getrlimit(getattr(resource, name))[0]
     return "" if limit == resource.RLIM_INFINITY else f" (`ulimit -{letter}` is {limit // unit})"
-
-
-def limit_memory(size: int, process: int = 0) -> None:
-    """Limit the address space of a process and of all that it starts; a limit that is lower stays.
-
-    Args:
-        size: Bytes.
-        process: Its number; this one by default.
-    """
-    if sys.platform != "linux":
-        return
-    import resource  # noqa: PLC0415 - not everywhere
-
-    before = resource.prlimit(process, resource.RLIMIT_AS)
-    least = min([size, *(limit for limit in before if limit != resource.RLIM_INFINITY)])
-    resource.prlimit(process, resource.RLIMIT_AS, (least, least))
 
 
 def _kind(error: BaseException) -> str | None:

@@ -7,31 +7,25 @@ interrupt and when this process ends, however it ends.
 from __future__ import annotations
 
 import contextlib
-import os
 import shlex
 import shutil
 import subprocess
 import threading
-from collections.abc import Generator, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from types import TracebackType
 from typing import IO, Self
 
 from scenicq.errors import Diagnostic, SolverError
 from scenicq.limits import LIMITS
-from scenicq.refusals import limit_memory, refused_by_system
+from scenicq.processes import end_group, ended_after, leashed, limit_memory
+from scenicq.refusals import refused_by_system
 from scenicq.smt.answer import Answer, NoAnswer, Sat
 from scenicq.smt.evaluation import holds
 from scenicq.smt.formula import Problem
-from scenicq.smt.pool import end_group
 from scenicq.smt.smtlib import read_reply, to_smtlib
 
 __all__ = ["SmtlibSolver"]
-
-
-_LEASHED = """(read -r word < "/dev/fd/$1"; kill -s KILL -- "-$$") < /dev/null > /dev/null 2>&1 &
-shift; exec "$@\""""
-"""A shell script that becomes a command, whose process group is killed when the other end of a pipe is closed."""
 
 
 class SmtlibSolver:
@@ -67,7 +61,7 @@ class SmtlibSolver:
 
     def check(self, problem: Problem, *, precision: float, timeout_s: float) -> Answer:
         """Decide a problem in a new process; see `Solver.check`."""
-        with _leashed(self._words) as (words, leash), self._spawn(words, leash) as process:
+        with leashed(self._words) as (words, leash), self._spawn(words, leash) as process:
             text, expired = _converse(process, to_smtlib(problem, precision).encode(), timeout_s)
         if len(text) > LIMITS.command_reply_bytes:
             return NoAnswer("garbage")
@@ -125,40 +119,19 @@ class SmtlibSolver:
         return SolverError(Diagnostic("solver-missing", message, hints=(hint,)))
 
 
-@contextlib.contextmanager
-def _leashed(words: Sequence[str]) -> Generator[tuple[Sequence[str], tuple[int, ...]]]:
-    """A command that is killed with its process group when the block or this process ends, however it ends.
-
-    The words to run in place of the command's, and the descriptors to pass.
-    """
-    if not hasattr(os, "killpg"):
-        yield words, ()
-        return
-    theirs, ours = os.pipe()
-    try:
-        yield ["/bin/sh", "-c", _LEASHED, "sh", str(theirs), *words], (theirs,)
-    finally:
-        os.close(ours)
-        os.close(theirs)
-
-
 def _converse(process: subprocess.Popen[bytes], script: bytes, timeout_s: float) -> tuple[bytes, bool]:
     """Write a script and read the reply; whether time ran out. The process has ended then, also on an interrupt."""
     assert process.stdin is not None
     assert process.stdout is not None
-    expired = threading.Event()
-    timer = threading.Timer(timeout_s, lambda: (expired.set(), end_group(process)))
-    timer.daemon = True
     writer = threading.Thread(target=_write, args=(process.stdin, script), daemon=True)
     try:
-        timer.start()
-        writer.start()
-        text = process.stdout.read(LIMITS.command_reply_bytes + 1)
-        if len(text) > LIMITS.command_reply_bytes:
-            end_group(process)
-        process.wait()
+        with ended_after(process, timeout_s) as expired:
+            writer.start()
+            text = process.stdout.read(LIMITS.command_reply_bytes + 1)
+            if len(text) > LIMITS.command_reply_bytes:
+                end_group(process)
+            process.wait()
     finally:
-        timer.cancel()
         end_group(process)
         if writer.ident is not None:
             writer.join()

@@ -9,13 +9,11 @@ from __future__ import annotations
 
 import contextlib
 import json
-import os
 import pickle
 import queue
 import signal
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -26,12 +24,13 @@ from typing import IO, Self
 from scenicq.budget import leave_out, uncounted
 from scenicq.errors import Diagnostic, SolverError
 from scenicq.limits import LIMITS
+from scenicq.processes import end_group, ended_after
 from scenicq.smt.answer import Answer, NoAnswer, Sat
 from scenicq.smt.evaluation import holds
 from scenicq.smt.formula import Problem
 from scenicq.smt.worker import Request, Setup, read_answer, seconds_of
 
-__all__ = ["DREAL", "PORTABLE", "WorkerSolver", "end_group"]
+__all__ = ["DREAL", "PORTABLE", "WorkerSolver"]
 
 PORTABLE = "scenicq.smt.portable:check"
 DREAL = "scenicq.smt.dreal:check"
@@ -230,20 +229,12 @@ class _Worker:
         process = self._process
         assert process is not None
         requests, answers = _pipes(process)
-        expired = threading.Event()
-        timer = threading.Timer(timeout_s, lambda: (expired.set(), end_group(process)))
-        timer.daemon = True
-        timer.start()
         line = b""
-        try:
+        # a process that has ended neither reads nor writes
+        with ended_after(process, timeout_s) as expired, contextlib.suppress(OSError):
             requests.write(message)
             requests.flush()
             line = answers.readline(LIMITS.worker_answer_bytes + 1)
-        except OSError:
-            # the process has ended
-            pass
-        finally:
-            timer.cancel()
         return line, expired.is_set()
 
     def stop(self) -> None:
@@ -262,14 +253,3 @@ def _pipes(process: subprocess.Popen[bytes]) -> tuple[IO[bytes], IO[bytes]]:
     assert process.stdin is not None
     assert process.stdout is not None
     return process.stdin, process.stdout
-
-
-def end_group(process: subprocess.Popen[bytes]) -> None:
-    """Kill a process that leads a process group, with the group."""
-    if process.poll() is not None:
-        return
-    if hasattr(os, "killpg"):
-        with contextlib.suppress(ProcessLookupError, PermissionError):
-            os.killpg(process.pid, signal.SIGKILL)
-    else:
-        process.kill()

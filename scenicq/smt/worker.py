@@ -21,7 +21,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import IO, Any, TypeGuard, cast
 
-from scenicq.refusals import limit_memory, refused_by_system
+from scenicq.processes import limit_memory
+from scenicq.refusals import refused_by_system
 from scenicq.smt.answer import Answer, NoAnswer, Sat, Unsat
 from scenicq.smt.formula import Problem
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from scenicq.errors import DataError, Diagnostic
-from scenicq.processes import Lost, Workers
-from scenicq.refusals import limit_memory
+from scenicq.processes import Lost, Workers, limit_memory
 from scenicq.store.dataset import DatasetReference
 
 __all__ = ["check_apart"]
