@@ -387,4 +387,5 @@ def _is_known(leaf: Leaf) -> bool:
 
 
 def _width(limits: Enclosure) -> NDArray[np.float64]:
-    return limits[..., 1, :] - limits[..., 0, :]
+    with np.errstate(over="ignore"):
+        return limits[..., 1, :] - limits[..., 0, :]

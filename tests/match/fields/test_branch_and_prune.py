@@ -39,12 +39,16 @@ from scenicq.forest.nodes import (
     VectorSum,
 )
 from scenicq.forest.scenario import Requirement
+from scenicq.forest.walk import leaves as leaves_of
 from scenicq.geometry.regions import Disc, PolygonSet, Rectangle
 from scenicq.limits import LIMITS
+from scenicq.match.decide.solver_step import ask
 from scenicq.match.fields.branch_and_prune import branch_and_prune
+from scenicq.match.options import MatchOptions
 from scenicq.match.problem.evaluation import replay
 from scenicq.match.problem.outcome import Refuted, Satisfied, Undecided
 from scenicq.match.tolerance import SLACK, Tolerance
+from scenicq.smt.solver import open_solver
 
 CLOSE = Tolerance(position=0.01, heading=0.01, other=0.01)
 
@@ -149,6 +153,27 @@ def test_a_limit_leaves_it_undecided(limit, monkeypatch):
     for name, items in SOMETIMES.items():
         found = branch_and_prune(items, CLOSE)
         assert isinstance(found, Satisfied) or (isinstance(found, Undecided) and found.reason), name
+
+
+def test_ranges_may_be_as_wide_as_numbers_are():
+    wide = between(-1.7e308, 1.7e308)
+    assert isinstance(branch_and_prune(required(compare(">", op("abs", wide), 1.75e308)), CLOSE), Refuted)
+
+
+def test_nothing_contradicts_a_solver():
+    options, kinds = MatchOptions(timeout_s=1.0), set()
+    with open_solver("portable") as solver:
+        for seed in range(40):
+            rng = random.Random(seed)
+            leaves = [between(*sorted((rng.uniform(-9, 9), rng.uniform(-9, 9)))) for _ in range(3)]
+            roots = [random_expression(rng, leaves) for _ in range(2)]
+            bounds = [compare(rng.choice(("<=", ">=")), root, rng.uniform(-20, 20)) for root in roots]
+            items = required(*(each for each in bounds if leaves_of(each)))
+            if items:
+                pair = type(branch_and_prune(items, CLOSE)), type(ask([items], options, solver))
+                assert pair not in ((Satisfied, Refuted), (Refuted, Satisfied)), seed
+                kinds.add(pair)
+    assert {(Satisfied, Satisfied), (Refuted, Refuted)} <= kinds
 
 
 @pytest.mark.parametrize("seed", range(60))
