@@ -18,7 +18,7 @@ from scenicq.store.columns import OUT_OF_PLANE, MemberColumns, RecordingColumns
 from scenicq.store.dataset import Dataset
 from scenicq.store.manifest import Manifest
 from scenicq.store.map_validation import check_regions
-from scenicq.store.row_owners import check_counts
+from scenicq.store.rules import check_counts
 from scenicq.store.schema import ADDED, ArrowTable
 from scenicq.store.segment import MapIndexes, SegmentWriter, read_segments
 from scenicq.store.validation import read_sound

@@ -9,7 +9,7 @@ import numpy as np
 from scenicq.errors import ScenicqError
 from scenicq.store.frame_index import frame_hashes, index_rows
 from scenicq.store.map_validation import check_lanes, check_regions
-from scenicq.store.row_owners import PART_COLUMNS, check_frame_index, check_part
+from scenicq.store.rules import PART_COLUMNS, check_frame_index, check_part
 from scenicq.store.schema import SEGMENT_TABLES
 from scenicq.store.validation import check_table, invalid, read_sound
 

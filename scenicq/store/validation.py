@@ -1,7 +1,7 @@
 """A dataset looked at as data: whether its tables hold what every reader of them takes for granted.
 
 Checksums say that files are as they were written, not that who wrote them meant well. Here each table is looked at by
-itself: columns, types, numbers, texts, JSON. `row_owners` compares tables with each other, `map_validation` looks at
+itself: columns, types, numbers, texts, JSON. `rules` compares tables with each other, `map_validation` looks at
 maps. What the writer guarantees needs no such look.
 """
 

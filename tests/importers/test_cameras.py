@@ -20,7 +20,7 @@ from scenicq.importers.ingest import ingest
 from scenicq.importers.motion import quaternion
 from scenicq.store.dataset import Dataset, open_dataset
 from scenicq.store.labels import Label, LabelObject, OutOfPlane, Recording
-from scenicq.store.row_owners import check_part
+from scenicq.store.rules import check_part
 from scenicq.store.writer import write_dataset
 
 SAMPLES = Path(__file__).parents[2] / "sample_data"

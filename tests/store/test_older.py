@@ -1,4 +1,4 @@
-"""What an older version wrote is read: a dataset of `nuscenes_tiny`, and results on `crossroads`."""
+"""What an older version wrote of `sample_data` is read: a dataset of `nuscenes_tiny`, results on `crossroads`."""
 
 from __future__ import annotations
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import json
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from itertools import groupby, pairwise
@@ -145,14 +146,20 @@ class Gathered:
             yield from _piece(path)[0]
 
 
-def _piece(path: Path) -> tuple[list[Record], Mapping[str, Any]]:
+def _piece(path: Path) -> tuple[list[Record], Funnel]:
     """The results in a file, and what was counted."""
     try:
         *lines, last = path.read_bytes().splitlines() or [b""]
-        return [decode_record(line) for line in lines], json.loads(last)["funnel"]
-    except (OSError, ValueError, KeyError, TypeError, msgspec.DecodeError):
+        counts = msgspec.json.decode(last, type=dict[str, dict[str, int | dict[str, int]]])["funnel"]
+        funnel = Funnel(**{name: _counted(counts[name]) for name in _COUNTS})
+        return [decode_record(line) for line in lines], funnel
+    except (OSError, KeyError, RecursionError, msgspec.DecodeError):
         raise DataError(Diagnostic("store-damaged", f"{path} is not a complete piece of a result",
                                    hints=("delete it and run its shard again",))) from None  # fmt: skip
+
+
+def _counted(value: int | dict[str, int]) -> Any:
+    return Counter(value) if isinstance(value, dict) else value
 
 
 def gather(folder: Path, question: str | None = None, *, only: int | None = None) -> Gathered:
@@ -185,13 +192,5 @@ def gather(folder: Path, question: str | None = None, *, only: int | None = None
                                    hints=("run their shards again",)))  # fmt: skip
     total = Funnel()
     for path in found:
-        _add(total, _piece(path)[1])
+        total.add(_piece(path)[1])
     return Gathered(chosen, tuple(found), total)
-
-
-def _add(total: Funnel, counts: Mapping[str, Any]) -> None:
-    for name in _COUNTS:
-        if isinstance(counts[name], dict):
-            getattr(total, name).update(counts[name])
-        else:
-            setattr(total, name, getattr(total, name) + counts[name])

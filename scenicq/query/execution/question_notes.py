@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
-import json
-from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+
+import msgspec
+from msgspec import Struct
 
 from scenicq.errors import DataError, Diagnostic, Source
-from scenicq.forest.scenario import BuiltIn
-from scenicq.match.options import MatchOptions
-from scenicq.match.tolerance import Tolerance
 from scenicq.query.execution.partitions import fingerprint
 from scenicq.query.execution.program_files import SiblingFiles, program_text
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.atomic_files import made_folder, write_whole
 from scenicq.store.dataset import open_dataset
-from scenicq.temporal.interval_options import IntervalOptions
 
 __all__ = ["name_question", "note_question", "noted_question"]
+
+
+class _Note(Struct, frozen=True):
+    """What is asked: the dataset's address, the program with its name and file, and the options."""
+
+    dataset: str
+    scenario: str
+    program: str
+    file: str
+    options: QueryOptions
 
 
 def name_question(query: Query) -> str:
@@ -37,16 +43,11 @@ def note_question(folder: Path, query: Query) -> None:
     file = _file(folder, question)
     if file.exists():
         return
-    content = {
-        "dataset": query.dataset.address,
-        "scenario": query.source.name,
-        "program": query.source.text,
-        "file": str(query.siblings.path.resolve()),
-        "options": asdict(query.options),
-    }
+    path = str(query.siblings.path.resolve())
+    note = _Note(query.dataset.address, query.source.name, query.source.text, path, query.options)
     try:
         with made_folder(folder):
-            write_whole(file, json.dumps(content, default=sorted) + "\n")
+            write_whole(file, msgspec.json.encode(note).decode() + "\n")
     except OSError as error:
         raise DataError(Diagnostic("target-unwritable", f"{file} cannot be written: {error.strerror}")) from None
 
@@ -63,33 +64,19 @@ def noted_question(folder: Path, question: str) -> Query:
     """
     file = _file(folder, question)
     try:
-        content = json.loads(file.read_bytes())
-        address, path, scenario, program = (str(content[key]) for key in ("dataset", "file", "scenario", "program"))
-        source, options = Source(scenario, program), _options(content["options"])
+        note = msgspec.json.decode(file.read_bytes(), type=_Note)
     except OSError:
         hint = "`match --shard` writes it beside the pieces"
         raise DataError(Diagnostic("file-missing", f"{file} cannot be read", hints=(hint,))) from None
-    except (ValueError, TypeError, KeyError, AttributeError):
-        raise DataError(Diagnostic("file-invalid", f"{file} does not say what was asked")) from None
-    query = Query(open_dataset(address), source, options, files=SiblingFiles(Path(path)))
+    except (msgspec.DecodeError, RecursionError) as error:
+        raise DataError(Diagnostic("file-invalid", f"{file} does not say what was asked: {error}")) from None
+    path, source = Path(note.file), Source(note.scenario, note.program)
+    query = Query(open_dataset(note.dataset), source, note.options, files=SiblingFiles(path))
     if name_question(query) != question:
-        message = f"the pieces in {folder} are of another version of {address} or of what {path} imports"
+        message = f"the pieces in {folder} are of another version of {note.dataset} or of what {path} imports"
         raise DataError(Diagnostic("store-damaged", message, hints=("match again",)))
     return query
 
 
 def _file(folder: Path, question: str) -> Path:
     return folder / f"{question}.json"
-
-
-def _options(fields: dict[str, Any]) -> QueryOptions:
-    match: dict[str, Any] = fields.pop("match")
-    tolerance, enforce, ignored = (match.pop(name) for name in ("tolerance", "enforce", "ignore_params"))
-    rules = tuple([(scope, name, size) for scope, name, size in tolerance["rules"]])
-    options = MatchOptions(
-        tolerance=Tolerance(**tolerance | {"rules": rules, "scopes": ()}),
-        enforce=frozenset(map(BuiltIn, enforce)),
-        ignore_params=frozenset(ignored),
-        **match,
-    )
-    return QueryOptions(match=options, time=IntervalOptions(**fields.pop("time")), **fields)
