@@ -142,8 +142,8 @@ class Source:
 
     @property
     def file_name(self) -> str:
-        """The name without folders."""
-        return self.name.replace("\\", "/").rpartition("/")[2]
+        """The name without folders; what is no text of it is escaped, as results name it."""
+        return self.name.replace("\\", "/").rpartition("/")[2].encode(errors="backslashreplace").decode()
 
     @cached_property
     def line_starts(self) -> tuple[int, ...]:

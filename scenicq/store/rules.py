@@ -140,7 +140,7 @@ def check_part(tables: Mapping[str, ArrowTable], names: Mapping[str, str], maps:
             rows = rows.append_column("row", pa.array(np.arange(len(table))))
             rows = rows.append_column("label", pa.array(owners[name])) if name in owners else rows
             # of a reader DuckDB makes a table of its own; to scan one of Arrow's it loads more than it saves
-            reader = rows.to_reader()  # noqa: F841 - DuckDB finds it by its name
+            connection.register("reader", rows.to_reader())
             connection.execute(f"CREATE TEMP TABLE {name} AS SELECT * FROM reader")
         for name, rows in ROWS.items():
             rules = [rule for rule in RULES if rule.table == name]

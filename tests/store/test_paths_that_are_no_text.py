@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from scenicq.importers.ingest import ingest
+from scenicq.query.execution.result_files import read_records
 
 ROOT = Path(__file__).parents[2]
 SOURCE = ROOT / "sample_data" / "crossroads"
@@ -46,3 +47,16 @@ def test_a_source_at_such_a_path_is_read(name: bytes, env: dict[str, str], tmp_p
     shutil.copytree(os.fsencode(SOURCE), place)
     code, told = run("ingest", place, tmp_path / "d", env=env)
     assert code == 0, told
+
+
+@pytest.mark.parametrize("form", ["jsonl", "csv", "parquet"])
+def test_results_name_a_program_at_such_a_path(form: str, tmp_path: Path) -> None:
+    ingest(SOURCE, tmp_path / "d")
+    program = os.fsencode(tmp_path) + b"/n\xff.scenic"
+    Path(os.fsdecode(program)).write_text(
+        "model scenic.domains.driving.model\nego = new Car\nrequire ego.speed > 1e6\n"
+    )
+    code, told = run("match", program, tmp_path / "d", "--all", "-o", tmp_path / f"r.{form}", env={})
+    assert code == 1, told
+    causes = {each.cause.place for each in read_records(tmp_path / f"r.{form}") if each.cause}
+    assert "n\\udcff.scenic:3:1" in causes

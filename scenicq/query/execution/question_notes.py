@@ -48,6 +48,9 @@ def note_question(folder: Path, query: Query) -> None:
     try:
         with made_folder(folder):
             write_whole(file, msgspec.json.encode(note).decode() + "\n")
+    except UnicodeEncodeError:
+        message = f"{file} cannot be written: the path {path} is not text in UTF-8"
+        raise DataError(Diagnostic("target-unwritable", message)) from None
     except OSError as error:
         raise DataError(Diagnostic("target-unwritable", f"{file} cannot be written: {error.strerror}")) from None
 
