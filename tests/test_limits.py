@@ -32,7 +32,6 @@ NO_LIMITS = {
     "smt/smtlib.py": "_LONGEST: nesting beyond which a part has a name",
     "store/arrays.py": "FEW, MOST_BYTES: how an array is made",
     "store/camera_rows.py": "LARGEST_IMAGE: what an image may be",
-    "store/manifest.py": "_LARGEST: what the file may say",
     "store/map_fit.py": "MOST_MAPS, _MOST_VEHICLES, _FEWEST...: a sample that is measured",
     "store/map_validation.py": "_DEEPEST: what a map may be",
     "store/motion.py": "LONGEST_GAP_US: what motion means",
