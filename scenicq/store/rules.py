@@ -22,7 +22,7 @@ from scenicq.store.in_memory import connect_in_memory
 from scenicq.store.schema import MEMBERSHIP_RADIUS_M, ArrowTable
 from scenicq.store.validation import invalid
 
-__all__ = ["PART_COLUMNS", "RULES", "Rule", "check_counts", "check_frame_index", "check_part"]
+__all__ = ["PART_COLUMNS", "RULES", "RowRule", "check_counts", "check_frame_index", "check_part"]
 
 PART_COLUMNS = {
     "labels": {"frame", "recording", "timestamp_us", "map", "ego_x", "ego_y", "ego_heading", "object_count",
@@ -62,7 +62,7 @@ ROWS = {
 """The rows of each table with what rules compare them to; a rule is a condition on these."""
 
 
-class Rule(NamedTuple):
+class RowRule(NamedTuple):
     """What no row of a table may be.
 
     Attributes:
@@ -77,47 +77,47 @@ class Rule(NamedTuple):
     bad: str
 
 
-def _position(column: str, expected: str) -> Rule:
+def _position(column: str, expected: str) -> RowRule:
     off = f"abs({column} - ({expected})) > {_CLOSE} * greatest(1, abs({expected}))"
-    return Rule(
+    return RowRule(
         "objects", column, "is not what the positions say", f"{off} OR ({column} IS NULL) <> (({expected}) IS NULL)"
     )
 
 
-def _camera(column: str, numbers: int) -> Rule:
+def _camera(column: str, numbers: int) -> RowRule:
     what = f"has not the {numbers} numbers of a camera, or has numbers without one"
-    return Rule("sensors", column, what, f"len({column}) <> CASE WHEN image_width IS NULL THEN 0 ELSE {numbers} END")
+    return RowRule("sensors", column, what, f"len({column}) <> CASE WHEN image_width IS NULL THEN 0 ELSE {numbers} END")
 
 
 _OTHER = "is not that of the label that the row belongs to"
 _OFF = "relative_heading - turn"
 RULES = (
-    Rule("labels", "frame", "comes before the row above, or twice", "key_above >= (recording, timestamp_us, frame)"),
-    Rule("labels", "map", "is no map of which the manifest knows", "map NOT IN (SELECT name FROM maps)"),
-    Rule("labels", "map", "changes within a recording", "above = recording AND map_above <> map"),
-    Rule("labels", "class_counts", "is not how many objects of each class the label has",
+    RowRule("labels", "frame", "comes before the row above, or twice", "key_above >= (recording, timestamp_us, frame)"),
+    RowRule("labels", "map", "is no map of which the manifest knows", "map NOT IN (SELECT name FROM maps)"),
+    RowRule("labels", "map", "changes within a recording", "above = recording AND map_above <> map"),
+    RowRule("labels", "class_counts", "is not how many objects of each class the label has",
          "list_sort(map_entries(class_counts)) <> classes"),
-    Rule("objects", "frame", _OTHER, "frame <> own_frame"),
-    Rule("objects", "recording", _OTHER, "recording <> own_recording"),
-    Rule("objects", "timestamp_us", _OTHER, "timestamp_us <> own_time"),
-    Rule("objects", "ordinal", "is not the row's number within its label", "ordinal <> row - first_object"),
-    Rule("objects", "id", "is the name of the ego", "id = 'ego'"),
-    Rule("objects", "id", "occurs twice in a label", "nth > 1"),
+    RowRule("objects", "frame", _OTHER, "frame <> own_frame"),
+    RowRule("objects", "recording", _OTHER, "recording <> own_recording"),
+    RowRule("objects", "timestamp_us", _OTHER, "timestamp_us <> own_time"),
+    RowRule("objects", "ordinal", "is not the row's number within its label", "ordinal <> row - first_object"),
+    RowRule("objects", "id", "is the name of the ego", "id = 'ego'"),
+    RowRule("objects", "id", "occurs twice in a label", "nth > 1"),
     _position("ego_right", "dx * cos(ego_heading) + dy * sin(ego_heading)"),
     _position("ego_ahead", "dy * cos(ego_heading) - dx * sin(ego_heading)"),
     _position("ego_distance", "sqrt(dx * dx + dy * dy)"),
-    Rule("objects", "relative_heading", "is not what the headings say",
+    RowRule("objects", "relative_heading", "is not what the headings say",
          f"abs(atan2(sin({_OFF}), cos({_OFF}))) > {_CLOSE} OR (relative_heading IS NULL) <> (turn IS NULL)"),
-    Rule("sensors", "frame", _OTHER, "frame <> own_frame"),
-    Rule("sensors", "channel", "occurs twice in a label", "nth > 1"),
-    Rule("sensors", "image_height", "is there without the width, or is not",
+    RowRule("sensors", "frame", _OTHER, "frame <> own_frame"),
+    RowRule("sensors", "channel", "occurs twice in a label", "nth > 1"),
+    RowRule("sensors", "image_height", "is there without the width, or is not",
          "(image_height IS NULL) <> (image_width IS NULL)"),
     _camera("intrinsics", 4),
     _camera("camera_pose", 7),
-    Rule("memberships", "distance", f"is more than {MEMBERSHIP_RADIUS_M} m",
+    RowRule("memberships", "distance", f"is more than {MEMBERSHIP_RADIUS_M} m",
          f"distance > {MEMBERSHIP_RADIUS_M + _CLOSE}"),
-    Rule("memberships", "frame", "is no frame of this part", "NOT has_frame"),
-    Rule("memberships", "object", "is not in the frame", "NOT has_object"),
+    RowRule("memberships", "frame", "is no frame of this part", "NOT has_frame"),
+    RowRule("memberships", "object", "is not in the frame", "NOT has_object"),
 )  # fmt: skip
 """Every rule; the first that is broken is told."""
 
