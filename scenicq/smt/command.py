@@ -142,6 +142,6 @@ def _write(stream: IO[bytes], script: bytes) -> None:
     try:
         stream.write(script)
         stream.close()
-    except OSError:
-        # the solver has ended before it read everything
+    except (OSError, ValueError):
+        # the solver has ended before it read everything, or an interrupt has closed the stream meanwhile
         pass

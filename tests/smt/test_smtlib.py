@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import pytest
@@ -11,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from scenicq.errors import SolverError
+from scenicq.smt import command
 from scenicq.smt.answer import Answer, NoAnswer, Sat, Unsat
 from scenicq.smt.command import SmtlibSolver
 from scenicq.smt.evaluation import evaluate
@@ -212,3 +215,15 @@ def test_commands_have_a_memory_limit(tmp_path: Path) -> None:
     for memory_mb, answer in ((400, NoAnswer("crash")), (4000, Unsat())):
         with SmtlibSolver(_stub(tmp_path, body), memory_mb=memory_mb) as solver:
             assert solver.check(ONE, precision=1e-3, timeout_s=20.0) == answer
+
+
+def test_a_script_for_a_stream_that_is_closed_is_let_go(monkeypatch):
+    with subprocess.Popen(["cat"], stdin=subprocess.PIPE, stdout=subprocess.DEVNULL) as process:
+        assert process.stdin is not None
+        process.stdin.close()
+        raised = []
+        monkeypatch.setattr(threading, "excepthook", raised.append)
+        writer = threading.Thread(target=command._write, args=(process.stdin, b"(check-sat)"))
+        writer.start()
+        writer.join()
+    assert raised == []
