@@ -140,8 +140,7 @@ def _worded_end() -> Generator[None]:
             _interrupted()
         refused = refused_by_system(error)
         show([Diagnostic("resources-exhausted", refused)] if refused else error.diagnostics)
-        late = any(each.code == "deadline-passed" for each in error.diagnostics)
-        raise click.exceptions.Exit(UNDECIDED if late else ERROR) from None
+        raise click.exceptions.Exit(ERROR) from None
     except KeyboardInterrupt:
         _interrupted()
     except BrokenPipeError:

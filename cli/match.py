@@ -31,12 +31,12 @@ from .deliver import Wanted, deliver, exit_code
 from .engine import parse_engine
 from .formats import FORMATS, SPREADSHEET_HELP
 from .funnel import show_funnel
-from .main import INTERRUPTS
+from .main import INTERRUPTS, UNDECIDED
 from .manual import OPEN, Manual
 from .option_type import OptionType
 from .options import DEFAULTS, TOPICS, option_type, query_options
 from .output import ProgressBar, choose_format
-from .pieces import Shard, parse_shard, run_shard
+from .pieces import LateShardError, Shard, parse_shard, run_shard
 from .plan import show_plan
 from .programs import PROGRAM_TEXT, SCENARIO, given_program
 from .remarks import remarks, show_remarks
@@ -194,7 +194,11 @@ def match(ctx: click.Context, scenario: str | None, dataset: str | None, *, prog
         with bar.aside():
             show_remarks(query, told, found)
     if shard is not None and file is not None:
-        query.funnel = replace(run_shard(query, shard, file, quiet=quiet), warnings=query.funnel.warnings)
+        try:
+            query.funnel = replace(run_shard(query, shard, file, quiet=quiet), warnings=query.funnel.warnings)
+        except LateShardError as error:
+            show(error.diagnostics)
+            ctx.exit(0 if exit_zero else UNDECIDED)
         _conclude(ctx, query, told, time.perf_counter() - started, summary=summary, quiet=quiet, exit_zero=exit_zero)
         return
     pieces = None

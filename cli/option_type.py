@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from scenicq.option_values import Kind
+from scenicq.option_values import OptionKind
 
 __all__ = ["OptionType"]
 
@@ -16,7 +16,7 @@ class OptionType(click.ParamType):  # pyright: ignore[reportMissingTypeArgument]
 
     name = "value"
 
-    def __init__(self, kind: Kind) -> None:
+    def __init__(self, kind: OptionKind) -> None:
         """Take the kind of its values."""
         self.kind = kind
 

@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from scenicq.match.options import MatchOptions
-from scenicq.option_values import Choice
+from scenicq.option_values import OneOf
 from scenicq.query.execution.option_texts import KINDS, OptionTexts, read_options
 from scenicq.query.execution.run import QueryOptions
 from scenicq.temporal.interval_options import DEFAULT_GAP_S
@@ -45,7 +45,7 @@ ONE_FRAME = {
 def option_type(name: str) -> click.ParamType[Any, Any]:
     """The values of an option of a query, by its name."""
     kind = KINDS[name]
-    return click.Choice(kind.texts) if isinstance(kind, Choice) else OptionType(kind)
+    return click.Choice(kind.texts) if isinstance(kind, OneOf) else OptionType(kind)
 
 
 def query_options(given: dict[str, Any]) -> QueryOptions:

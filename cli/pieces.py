@@ -17,10 +17,14 @@ from scenicq.query.execution.run import Query
 
 from .output import ProgressBar
 
-__all__ = ["Shard", "parse_shard", "run_shard"]
+__all__ = ["LateShardError", "Shard", "parse_shard", "run_shard"]
 
 Shard = tuple[int, int]
 """Which piece, from 1, of how many."""
+
+
+class LateShardError(DataError):
+    """The time was over before a shard was finished."""
 
 
 def parse_shard(_ctx: click.Context, _parameter: click.Parameter, text: str | None) -> Shard | None:
@@ -37,7 +41,7 @@ def _whole(query: Query, shard: Shard, folder: Path, bar: ProgressBar) -> Iterat
     """The records of a shard, all of them; what is asked is written once they are there, not by a run that is stopped.
 
     Raises:
-        DataError: deadline-passed.
+        LateShardError: deadline-passed.
     """
     origin = name_origin(query.dataset)
     for result in query.results(bar.advance):
@@ -46,7 +50,7 @@ def _whole(query: Query, shard: Shard, folder: Path, bar: ProgressBar) -> Iterat
         number, count = shard
         message = f"shard {number}/{count} was not finished by the --deadline, and a shard is kept whole or not at all"
         hints = ("more shards are smaller; those that are finished are kept",)
-        raise DataError(Diagnostic("deadline-passed", message, hints=hints))
+        raise LateShardError(Diagnostic("deadline-passed", message, hints=hints))
     note_question(folder, query)
 
 

@@ -15,8 +15,20 @@ from typing import Any, Literal, Protocol
 from scenicq.errors import DataError, Diagnostic, similar
 
 __all__ = [
-    "FURTHEST_M", "HALF", "LONGEST_S", "SCORE", "SEED", "WIDTH", "Amount", "Choice", "Count", "Flag", "Kind", "Text",
-    "read_option", "read_options_of",
+    "FURTHEST_M",
+    "HALF",
+    "LONGEST_S",
+    "SCORE",
+    "SEED",
+    "WIDTH",
+    "Amount",
+    "Count",
+    "Flag",
+    "OneOf",
+    "OptionKind",
+    "Text",
+    "read_option",
+    "read_options_of",
 ]  # fmt: skip
 
 LONGEST_S = 2_000_000.0
@@ -39,7 +51,7 @@ _EXAMPLES = {
 }
 
 
-class Kind(Protocol):
+class OptionKind(Protocol):
     """What values an option has."""
 
     @property
@@ -73,7 +85,7 @@ class Flag:
 
 
 @dataclass(frozen=True, slots=True)
-class Choice:
+class OneOf:
     """One of some texts."""
 
     texts: tuple[str, ...]
@@ -178,12 +190,12 @@ HALF = Amount("m", 1.0, 1000.0)
 WIDTH = Count(50, 10_000)
 """Pixels of a picture."""
 SEED = Count(0)
-"""Of random numbers."""
+"""A seed of random numbers."""
 SCORE = Amount("", -math.inf, math.inf)
-"""Of a prediction."""
+"""The score of a prediction."""
 
 
-def read_option(name: str, kind: Kind, value: Any) -> Any:
+def read_option(name: str, kind: OptionKind, value: Any) -> Any:
     """The value of an option.
 
     Args:
@@ -202,7 +214,7 @@ def read_option(name: str, kind: Kind, value: Any) -> Any:
 
 
 def read_options_of(
-    kinds: Mapping[str, Kind], given: Mapping[str, Any], optional: Iterable[str] = ()
+    kinds: Mapping[str, OptionKind], given: Mapping[str, Any], optional: Iterable[str] = ()
 ) -> dict[str, Any]:
     """The values of options that are given.
 

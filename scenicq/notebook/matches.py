@@ -21,7 +21,7 @@ from scenicq.match.matcher import Matcher
 from scenicq.match.verdict import NoMatch
 from scenicq.notebook.judgements import Judgement
 from scenicq.notebook.pictures import SCROLLS, DisplayedText, Picture, take_picture
-from scenicq.option_values import SCORE, SEED, Choice, read_option
+from scenicq.option_values import SCORE, SEED, OneOf, read_option
 from scenicq.query.execution.lazy_solver import LazySolver
 from scenicq.query.execution.records import json_text, record
 from scenicq.query.execution.result_origin import name_origin
@@ -312,7 +312,7 @@ class Matches(Sequence[FrameResult]):
                 score, or another word for `missing`.
         """
         seed = read_option("seed", SEED, seed)
-        missing = read_option("missing", Choice(get_args(Missing)), missing)
+        missing = read_option("missing", OneOf(get_args(Missing)), missing)
         least_score = None if least_score is None else read_option("least_score", SCORE, least_score)
         name = Path(self.query.source.name.strip("<>")).stem
         results = {name: [each.result for each in self._all()]}

@@ -15,7 +15,7 @@ import pytest
 
 import scenicq
 from scenicq.errors import ScenicqError
-from scenicq.option_values import Amount, Choice, Count, Flag, Kind, Text, read_option
+from scenicq.option_values import Amount, Count, Flag, OneOf, OptionKind, Text, read_option
 from scenicq.query.execution.option_texts import KINDS
 from scenicq_cli.main import COMMANDS, cli
 from scenicq_cli.manual import variable_of
@@ -128,7 +128,7 @@ def test_every_option_has_a_variable_with_the_name_that_people_write(name, comma
     given = words(command, None, [])
     if option.required:
         given = [each for each in given if each not in (option.opts[0], NEEDED[option.name])]
-    context = command.make_context(name, given)
+    context = command.make_context(name, given, parent=click.Context(cli, **cli.context_settings))
     assert context.get_parameter_source(option.name) is click.core.ParameterSource.ENVIRONMENT, variable
 
 
@@ -147,7 +147,9 @@ BAD_VALUES: list[Any] = [
 
 
 @pytest.mark.parametrize(("name", "kind"), KINDS.items())
-def test_python_refuses_what_the_command_refuses(name: str, kind: Kind, crossroads, scenarios, tmp_path, monkeypatch):
+def test_python_refuses_what_the_command_refuses(
+    name: str, kind: OptionKind, crossroads, scenarios, tmp_path, monkeypatch
+):
     folder = shutil.copytree(crossroads, tmp_path / "dataset")
     before = sorted(folder.rglob("*"))
     dataset = scenicq.open(folder)
@@ -183,10 +185,10 @@ def test_what_stands_for_no_value_is_refused_where_there_is_a_default(crossroads
         (("timeout", Amount("s")), 3, 3.0),
         (("radius", Amount("m")), "30m", 30.0), (("radius", Amount("m")), "0.5km", 500.0),
         (("radius", Amount("m")), "120cm", 1.2), (("limit", Count()), "7", 7), (("exact", Flag()), True, True),
-        (("ego", Choice(("label", "any"))), "any", "any"), (("tolerance", Text(numeric=True)), 0.25, "0.25"),
+        (("ego", OneOf(("label", "any"))), "any", "any"), (("tolerance", Text(numeric=True)), 0.25, "0.25"),
     ],
 )  # fmt: skip
-def test_a_number_is_read_with_its_unit(option: tuple[str, Kind], text: Any, value: Any):
+def test_a_number_is_read_with_its_unit(option: tuple[str, OptionKind], text: Any, value: Any):
     assert read_option(*option, text) == pytest.approx(value)
 
 

@@ -154,7 +154,7 @@ def test_no_solver_command_is_sent_what_few_understand(command, tmp_path):
     )
     words = ("--method", "smt", "--solver", f"sh {tmp_path / 'solver.sh'}", "--no-prefilter", "--jobs", "1")
     done = run(command, "match", tmp_path / "p.scenic", tmp_path / "d", *words)
-    assert done.returncode in (0, 1), done.stderr
+    assert done.returncode in (0, 1, 3), done.stderr
     assert "(check-sat)" in seen.read_text()
     assert "atan2" not in seen.read_text()
 

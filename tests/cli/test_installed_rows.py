@@ -148,7 +148,7 @@ def test_a_clock_that_is_set_ends_no_run_and_keeps_none_alive(hours, asked, tmp_
         done = asked(CARS, *words, "300", "--jobs", jobs, env=env)
         assert (done.returncode, len(done.stdout.splitlines())) == (0, 4 * FRAMES), done.stderr
         over = asked(CARS, *words, "0.000001", "--jobs", jobs, env=env)
-        assert (over.returncode, over.stdout) == (1, "")
+        assert (over.returncode, over.stdout) == (3, "")
         assert "warning[deadline-passed]" in over.stderr
 
 

@@ -19,6 +19,7 @@ import pytest
 
 from scenicq.errors import DataError
 from scenicq.importers.ingest import ingest
+from scenicq.query.execution.records import FrameRecord
 from scenicq.store.dataset import open_dataset
 from scenicq.store.frame_names import ShortNames, find_recording
 from scenicq_cli.main import cli
@@ -104,11 +105,7 @@ def test_in_a_pipe_nothing_is_cut(monkeypatch):
     monkeypatch.delenv("COLUMNS", raising=False)
     sink = io.BytesIO()
     table = Table(TextStream(sink), lambda: str.upper)
-    record = {
-        "frame": "f" * 100, "recording": "r" * 100, "timestamp_us": 0, "verdict": "match",
-        "correspondence": {"ego": "ego"}, "sensors": {},
-    }  # fmt: skip
-    table.write(record)
+    table.write(FrameRecord(frame="f" * 100, recording="r" * 100, verdict="match", correspondence={"ego": "ego"}))
     table.finish()
     assert "f" * 100 in sink.getvalue().decode()
 
@@ -127,10 +124,13 @@ def test_on_a_terminal_it_fits_and_names_frames_as_other_commands_take_them(cros
     table = Table(TextStream(sink), dataset.short_names)
     labels = list(itertools.islice(dataset.labels(), 120))
     for label in labels:
-        table.write({
-            "frame": label.frame, "recording": label.recording, "timestamp_us": label.timestamp_us, "verdict": "match",
-            "correspondence": {"leftward": label.objects[0].id if label.objects else "ego"}, "sensors": {},
-        })  # fmt: skip
+        roles = {"leftward": label.objects[0].id if label.objects else "ego"}
+        table.write(
+            FrameRecord(
+                frame=label.frame, recording=label.recording, timestamp_us=label.timestamp_us, verdict="match",
+                correspondence=roles,
+            )
+        )  # fmt: skip
     table.finish()
     lines = [re.sub("\x1b\\[[0-9;]*m", "", line) for line in sink.getvalue().decode().splitlines()]
     assert max(map(len, lines)) <= 70

@@ -153,7 +153,6 @@ def test_requirements_see_the_ego_and_the_names_of_their_moment() -> None:
         ("apparent heading of (1, 2)", "wrong-type"),
         ("front of (1, 2)", "wrong-type"),
         ("1 if Range(0, 1) > 0.5 else 2", "random-branch"),
-        ("[Range(0, 1)] == [1]", "random-branch"),
         ("ego.lane", "unknown-attribute"),
         ("ego.positon", "unknown-attribute"),
         ("R[0]", "wrong-type"),

@@ -16,7 +16,7 @@ from scenicq.errors import ScenicqError, Source
 from scenicq.importers.ingest import ingest
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import Tolerance
-from scenicq.query.execution.records import record
+from scenicq.query.execution.records import Record, record
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.dataset import Dataset, open_dataset
 
@@ -89,7 +89,7 @@ def named(dataset: Dataset, program: Example, options: MatchOptions) -> dict[str
     return {result.frame: record(result).verdict for result in results}
 
 
-def found(dataset: Dataset, program: Example, options: MatchOptions, *, prefilter: bool) -> dict[str, object] | str:
+def found(dataset: Dataset, program: Example, options: MatchOptions, *, prefilter: bool) -> dict[str, Record] | str:
     """What a query gives for each frame that is not excluded, or its error."""
     try:
         results = query(dataset, program, options, prefilter=prefilter).results()
@@ -110,12 +110,12 @@ def compare(dataset: Dataset, chosen: list[Example]) -> tuple[list[str], int]:
             continue
         for frame in with_it.keys() | without.keys():
             pair = with_it.get(frame), without.get(frame)
-            if not any(each is not None and each["verdict"] == "unknown" for each in pair):
+            if not any(each is not None and each.verdict == "unknown" for each in pair):
                 told += [f"{program.name}, {frame}: {pair[0]} is not {pair[1]}"] * (pair[0] != pair[1])
                 matches += pair[0] == pair[1]
         bare = named(dataset, program, options)
         for frame in with_it.keys() | bare.keys():
-            known = with_it[frame]["verdict"] if frame in with_it else None  # type: ignore[index]
+            known = with_it[frame].verdict if frame in with_it else None
             odd = known != bare.get(frame) and "unknown" not in (known, bare.get(frame))
             told += [f"{program.name}, {frame}: {bare.get(frame)} without proofs, {known} with them"] * odd
     return told, matches

@@ -12,7 +12,7 @@ from scenicq.errors import DataError, Diagnostic, SolverError
 from scenicq.forest.scenario import BuiltIn
 from scenicq.match.options import MatchOptions, Method
 from scenicq.match.tolerance import parse_tolerance
-from scenicq.option_values import FURTHEST_M, Amount, Choice, Count, Flag, Kind, Text, read_options_of
+from scenicq.option_values import FURTHEST_M, Amount, Count, Flag, OneOf, OptionKind, Text, read_options_of
 from scenicq.query.execution.run import QueryOptions
 from scenicq.store.classes import Granularity
 from scenicq.temporal.interval_options import DEFAULT_GAP_S, IntervalOptions, Intervals
@@ -62,15 +62,15 @@ class OptionTexts(TypedDict, total=False):
 
 _SOLVERS = ("auto", "dreal", "portable")
 
-KINDS: Mapping[str, Kind] = {
+KINDS: Mapping[str, OptionKind] = {
     "tolerance": Text("sizes such as position=0.25,heading=5deg, or one for all", numeric=True),
-    "classes": Choice(get_args(Granularity)),
-    "ego": Choice(("label", "any")),
+    "classes": OneOf(get_args(Granularity)),
+    "ego": OneOf(("label", "any")),
     "radius": Amount("m", most=FURTHEST_M, above=True),
     "enforce": Text("names of built-in requirements, separated by commas"),
     "exact": Flag(),
     "solver": Text("the name of a solver"),
-    "method": Choice(get_args(Method)),
+    "method": OneOf(get_args(Method)),
     "prefilter": Flag(),
     "jobs": Count(most=4096),
     "timeout": Amount("s", above=True),
@@ -79,12 +79,12 @@ KINDS: Mapping[str, Kind] = {
     "every": Flag(),
     "all_matches": Flag(),
     "strict": Flag(),
-    "scenic": Choice(tuple(VERSIONS)),
+    "scenic": OneOf(tuple(VERSIONS)),
     "initial": Flag(),
     "ignore_params": Text("names of parameters, separated by commas"),
-    "behaviors": Choice(("refuse", "ignore")),
+    "behaviors": OneOf(("refuse", "ignore")),
     "min_duration": Amount("s"),
-    "intervals": Choice(get_args(Intervals)),
+    "intervals": OneOf(get_args(Intervals)),
     "gap": Amount("s", above=True),
     "model": Text("the name of a world model"),
 }

@@ -29,7 +29,7 @@ def test_small_blocks_and_processes_give_the_same(dataset, jobs, monkeypatch):
     source = Source("test.scenic", HEADER + TIED["ahead of another"])
     whole = Query(dataset, source, QueryOptions(every=True, solver="portable"))
     expected = [record(result) for result in whole.results()]
-    assert [row["frame"] for row in expected] == [label.frame for label in dataset.labels()]
+    assert [row.frame for row in expected] == [label.frame for label in dataset.labels()]
     assert len(whole.blocks("street")) > 3
     query = Query(dataset, source, QueryOptions(every=True, solver="portable", jobs=jobs))
     assert [record(result) for result in query.results()] == expected

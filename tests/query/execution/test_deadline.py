@@ -84,7 +84,7 @@ def test_a_deadline_does_not_make_another_question(dataset: Dataset) -> None:
 def test_the_command_says_that_it_stopped_and_goes_on(run: Any, crossroads: Path, tmp_path: Path) -> None:
     words = ("match", PROGRAM, crossroads, "--classes", "coarse", "-o", tmp_path / "found.jsonl", "--resume")
     stopped = run(*words, "--deadline", "1e-9")
-    assert stopped.exit_code == 1
+    assert stopped.exit_code == 3
     assert "warning[deadline-passed]" in stopped.stderr
     assert "goes on from here" in stopped.stderr
     assert (tmp_path / "found.jsonl").read_text(encoding="utf-8") == ""
@@ -94,7 +94,7 @@ def test_the_command_says_that_it_stopped_and_goes_on(run: Any, crossroads: Path
 
 def test_a_shard_is_kept_whole_or_not_at_all(run: Any, crossroads: Path, tmp_path: Path) -> None:
     found = run("match", PROGRAM, crossroads, "--shard", "1/2", "-o", tmp_path, "--deadline", "1e-9")
-    assert found.exit_code == 2
+    assert found.exit_code == 3
     assert "error[deadline-passed]" in found.stderr
     assert not list(tmp_path.glob("*-of-*"))
 
