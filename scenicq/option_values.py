@@ -132,7 +132,7 @@ class Amount:
     """A number, in a text with or without its unit.
 
     Attributes:
-        unit: Of the value.
+        unit: The unit of the value.
         least: The least value.
         most: The greatest one.
         above: Whether the value is above the least.
@@ -199,7 +199,7 @@ def read_option(name: str, kind: OptionKind, value: Any) -> Any:
     """The value of an option.
 
     Args:
-        name: Of the option.
+        name: The name of the option.
         kind: What values it has.
         value: What somebody has written.
 

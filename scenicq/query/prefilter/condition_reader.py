@@ -91,8 +91,8 @@ def object_columns(alias: str, prefix: str = "") -> dict[str, str | tuple[str, s
     """The properties that have columns, with them.
 
     Args:
-        alias: Of the table.
-        prefix: Of the columns: those of the ego's begin with `ego_`.
+        alias: The alias of the table.
+        prefix: How the columns begin: those of the ego with `ego_`.
     """
     start = f"{alias}.{prefix}"
     found: dict[str, str | tuple[str, str]] = {name: f"{start}{name}" for name in _NUMBERS}
@@ -112,7 +112,7 @@ class ConditionReader:
 
     Attributes:
         scenario: The scenario.
-        tolerance: Of its properties.
+        tolerance: The tolerance of its properties.
         relations: Those of the map, which gets the tables that conditions ask for.
         road: The map's direction of the road.
         proving: Whether conditions are what must hold, not what may.
