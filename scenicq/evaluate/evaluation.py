@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, TypeAlias, cast
+from typing import Any, TypeAlias, cast, get_args
 
 import msgspec
 import numpy as np
@@ -26,6 +26,7 @@ from scenicq.evaluate.slices import Slice, slices
 from scenicq.evaluate.weighting import Weighted, weighted
 from scenicq.importers.prediction_files import read_predictions
 from scenicq.importers.predictions import THRESHOLDS_M, Predictions
+from scenicq.option_values import SCORE, SEED, OneOf, read_option
 from scenicq.query.execution.records import FrameRecord, IntervalRecord, Record, record, record_of
 from scenicq.query.execution.result_files import read_records
 from scenicq.query.execution.result_origin import check_origins, name_origin
@@ -153,8 +154,8 @@ def evaluate(
     if distance_m not in THRESHOLDS_M:
         hint = f"known are {', '.join(f'{known:g}' for known in THRESHOLDS_M)}"
         raise DataError(Diagnostic("option-invalid", f"no centre distance of {distance_m:g} m", hints=(hint,)))
-    if least_score is not None and not math.isfinite(least_score):
-        raise DataError(Diagnostic("option-invalid", f"{least_score} is no score from which predictions count"))
+    seed, missing = read_option("seed", SEED, seed), read_option("missing", OneOf(get_args(Missing)), missing)
+    least_score = None if least_score is None else read_option("least_score", SCORE, least_score)
     runs = None if simulated is None else read_simulated(Path(simulated), seed)
     named: Mapping[str, Results] = (
         cast("Mapping[str, Results]", results) if isinstance(results, Mapping) else {_name_of(results): results}

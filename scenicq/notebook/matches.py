@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Any
 
 from scenicq.errors import render
 from scenicq.evaluate.detection import Missing
@@ -21,7 +21,6 @@ from scenicq.match.matcher import Matcher
 from scenicq.match.verdict import NoMatch
 from scenicq.notebook.judgements import Judgement
 from scenicq.notebook.pictures import SCROLLS, DisplayedText, Picture, take_picture
-from scenicq.option_values import SCORE, SEED, OneOf, read_option
 from scenicq.query.execution.lazy_solver import LazySolver
 from scenicq.query.execution.records import json_text, record
 from scenicq.query.execution.result_origin import name_origin
@@ -311,9 +310,6 @@ class Matches(Sequence[FrameResult]):
             DataError: A file cannot be read or does not fit the dataset; option-invalid for another distance, seed or
                 score, or another word for `missing`.
         """
-        seed = read_option("seed", SEED, seed)
-        missing = read_option("missing", OneOf(get_args(Missing)), missing)
-        least_score = None if least_score is None else read_option("least_score", SCORE, least_score)
         name = Path(self.query.source.name.strip("<>")).stem
         results = {name: [each.result for each in self._all()]}
         judged = evaluate(results, self.query.dataset, predictions, distance_m=distance_m, least_score=least_score,

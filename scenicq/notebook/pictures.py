@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from html import escape
 from pathlib import Path
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.option_values import HALF, WIDTH, read_option
 from scenicq.report.backdrop import Backdrop
-from scenicq.report.picture import Shot, Style, draw
+from scenicq.report.picture import Shot, draw
 from scenicq.report.png import png
 from scenicq.store.atomic_files import whole_file
 
@@ -88,7 +89,5 @@ def take_picture(shot: Shot, backdrop: Backdrop, half: float | None, width: int)
     size = None if half is None else read_option("half", HALF, half)
     pixels = read_option("width", WIDTH, width)
 
-    def drawn(style: Style) -> str:
-        return draw(shot, backdrop, half=size, pixels=pixels, style=style)
-
-    return Picture(drawn("adaptive"), lambda: drawn("light"))
+    drawn = partial(draw, shot, backdrop, half=size, pixels=pixels)
+    return Picture(drawn(style="adaptive"), partial(drawn, style="light"))

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
+from scenicq.errors import Span
 from scenicq.forest.groups import PARAMS, Comparison, Condition, Group
 from scenicq.forest.nodes import Select
 from scenicq.forest.scenario import Scenario
@@ -49,17 +50,19 @@ def necessary_conditions(
     for owner in scenario.objects:
         for name in compared(owner, frozenset(owner.properties)):
             given = owner.properties[name]
-            what = f"{owner.name}.{name}"
-            for each in reader.comparison(Comparison(owner.index, name, given.value, given.span)):
-                if each.region or each.sql is not True:
-                    yield replace(each, sql=each.sql or "false", what=what, span=given.span)
+            found = reader.comparison(Comparison(owner.index, name, given.value, given.span))
+            yield from _named(found, f"{owner.name}.{name}", given.span)
     for requirement in scenario.requirements:
-        if requirement.built_in is not None or requirement.span is None:
-            continue
-        what = " ".join(requirement.span.text.split())
-        for each in reader.requirement(requirement.condition):
-            if each.region or each.sql is not True:
-                yield replace(each, sql=each.sql or "false", what=what, span=requirement.span)
+        if requirement.built_in is None and requirement.span is not None:
+            what = " ".join(requirement.span.text.split())
+            yield from _named(reader.requirement(requirement.condition), what, requirement.span)
+
+
+def _named(found: Iterator[ColumnCondition], what: str, span: Span | None) -> Iterator[ColumnCondition]:
+    """Conditions that exclude something, with what they come from."""
+    for each in found:
+        if each.region or each.sql is not True:
+            yield replace(each, sql=each.sql or "false", what=what, span=span)
 
 
 def sufficient_conditions(
