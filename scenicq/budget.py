@@ -8,6 +8,8 @@ for together costs little beside what decides it.
 
 Work is counted in processor seconds, our own as that of a worker process, so that a busy machine changes no verdict. A
 solver that is a command of somebody else is counted by the wall.
+
+A whole run may have a `deadline`, by the wall. The same loops look at it; what they work on then is given up.
 """
 
 from __future__ import annotations
@@ -20,13 +22,16 @@ from contextvars import ContextVar, Token
 from dataclasses import dataclass
 
 __all__ = [
+    "DeadlineError",
     "Exhausted",
     "Trials",
     "clock",
+    "deadline",
     "leave_out",
     "limited",
     "look",
     "time_is_up",
+    "time_left_s",
     "trials_left",
     "uncounted",
     "waiting",
@@ -48,6 +53,10 @@ class Exhausted(Exception):
         self.detail = detail
 
 
+class DeadlineError(Exception):
+    """The time that a run may take is over."""
+
+
 @dataclass(slots=True)
 class _Limit:
     """When the time of a block is up.
@@ -55,10 +64,12 @@ class _Limit:
     Attributes:
         until: On the clock of this thread; what solvers took is taken off beforehand.
         not_before: By the wall: a thread never works faster than that.
+        deadline: When the run is over, as of `time.monotonic`.
     """
 
     until: float = math.inf
     not_before: float = math.inf
+    deadline: float = math.inf
 
 
 _ENDLESS = _Limit()
@@ -98,9 +109,10 @@ class limited:  # noqa: N801 - read as a statement
 
     def __enter__(self) -> None:
         """Set the clock."""
-        outer, used_s = _LIMIT.get().until, time.thread_time()
-        left = min(outer - used_s, self._seconds)
-        self._token = _LIMIT.set(_Limit(used_s + left, time.perf_counter() + left))
+        outer, used_s = _LIMIT.get(), time.thread_time()
+        left = min(outer.until - used_s, self._seconds)
+        not_before = time.perf_counter() + min(left, time_left_s(outer.deadline))
+        self._token = _LIMIT.set(_Limit(used_s + left, not_before, outer.deadline))
 
     def __exit__(self, *_: object) -> None:
         """Go back to the clock of the block around."""
@@ -108,20 +120,54 @@ class limited:  # noqa: N801 - read as a statement
         _LIMIT.reset(self._token)
 
 
+@contextmanager
+def deadline(until: float | None) -> Generator[None]:
+    """Give up what happens in the block when the time of the whole run is over.
+
+    Args:
+        until: When it is over, as of `time.monotonic`, which never jumps and which all processes of a machine share;
+            None for never.
+
+    Raises:
+        DeadlineError: It is over; at once, or where the block looks at the clock, or at its end.
+    """
+    outer = _LIMIT.get()
+    over = min(outer.deadline, math.inf if until is None else until)
+    token = _LIMIT.set(_Limit(outer.until, -math.inf, over))
+    try:
+        _look_at_deadline(over)
+        yield
+        _look_at_deadline(over)
+    finally:
+        _LIMIT.reset(token)
+
+
+def _look_at_deadline(over: float) -> None:
+    if time.monotonic() >= over:
+        raise DeadlineError
+
+
+def time_left_s(until: float | None) -> float:
+    """Seconds until the time of a run is over, below 0 afterwards; infinity without a limit; see `deadline`."""
+    return math.inf if until is None else until - time.monotonic()
+
+
 def look() -> None:
     """Look at the clock.
 
     Raises:
         Exhausted: The time is used up.
+        DeadlineError: The time of the whole run is over.
     """
     limit = _LIMIT.get()
     # the thread's clock takes ten times as long to read as the wall's
     if time.perf_counter() <= limit.not_before:
         return
+    _look_at_deadline(limit.deadline)
     left = limit.until - time.thread_time()
     if left < 0:
         raise Exhausted("timeout")
-    limit.not_before = time.perf_counter() + left
+    limit.not_before = time.perf_counter() + min(left, time_left_s(limit.deadline))
 
 
 def time_is_up() -> bool:
@@ -176,7 +222,7 @@ def waiting(seconds: float) -> Generator[float]:
     look()
     limit, began = _LIMIT.get(), clock()
     try:
-        yield min(seconds, limit.until - time.thread_time())
+        yield min(seconds, limit.until - time.thread_time(), time_left_s(limit.deadline))
     finally:
         waited = clock() - began
         limit.until -= waited

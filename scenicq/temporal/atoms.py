@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TypeAlias, cast
+from typing import Any, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from scenicq.budget import look
 from scenicq.forest.clear_columns import QuickColumns, quick_form
 from scenicq.forest.column_domain import ColumnDomain, first_direction
 from scenicq.forest.columns import DEFINED, UNDEFINED, Coded, Column, column_of, constant_column, truth_of
@@ -86,6 +87,7 @@ class AtomColumns:
     undecided: list[NDArray[np.bool_]] = field(default_factory=list["NDArray[np.bool_]"])
     _features: dict[tuple[int, str], Column | None] = field(default_factory=dict["tuple[int, str]", "Column | None"])
     _looked_up: dict[int, _LookedUp] = field(default_factory=dict["int", "_LookedUp"])
+    _readings: dict[int, tuple[Node, NDArray[np.int64]]] = field(default_factory=dict["int", "tuple[Node, Any]"])
 
     def assigned(self, assignment: Mapping[Identity, Value]) -> AtomColumns:
         """The same with values of random variables; what is observed, and the map's answers about it, are shared."""
@@ -119,6 +121,7 @@ class AtomColumns:
 
     def truth_of(self, condition: Node) -> Truth:
         """As `truth`, of an expanded condition; unknown where too many directions are allowed to try them all."""
+        look()
         found = np.full(len(self.samples), FALSE)
         several = np.zeros(len(self.samples), np.bool_)
         todo: list[dict[int, int]] = [{}]
@@ -210,6 +213,28 @@ class AtomColumns:
                 return cast("float | bool", data[sample].item())
             case _:
                 return None
+
+    def readings(self, condition: Node) -> NDArray[np.int64]:
+        """What an expanded condition reads at each sample, by number; -1 where some of it is not observed.
+
+        Equal numbers are equal readings. Shape (n,).
+        """
+        if id(condition) not in self._readings:
+            self._readings[id(condition)] = condition, self._read(condition)
+        return self._readings[id(condition)][1]
+
+    def _read(self, condition: Node) -> NDArray[np.int64]:
+        nodes = [each for each in postorder((condition,)) if isinstance(each, Feature) and each.current]
+        found, observed = np.zeros(len(self.samples), np.int64), np.ones(len(self.samples), np.bool_)
+        for each in nodes:
+            column = self._feature(each)
+            if column is None:
+                return np.full(len(self.samples), -1)
+            observed &= column.status == DEFINED
+            for part in _parts(column):
+                _, codes = np.unique(part, return_inverse=True)
+                _, found = np.unique(found * (int(codes.max(initial=0)) + 1) + codes, return_inverse=True)
+        return np.where(observed, found, -1)
 
     def _definition(self, feature: Feature) -> Node | None:
         if feature.property in MOVING or self._feature(feature) is not None:
@@ -332,6 +357,19 @@ def _as_truth(found: Column, count: int) -> Truth:
     held = np.where(truth_of(found.data), TRUE, FALSE)
     truth = np.where(found.status == DEFINED, held, np.where(found.status == UNDEFINED, FALSE, UNKNOWN))
     return np.broadcast_to(truth, count).copy()
+
+
+def _parts(column: Column) -> tuple[NDArray[Any], ...]:
+    """The arrays that the values of a feature are made of."""
+    match column.data:
+        case Coded(which):
+            return (which,)
+        case (x, y):
+            return x, y
+        case np.ndarray() as data:
+            return (data,)
+        case _:
+            raise TypeError("no feature is a region")
 
 
 def _as_at(samples: NDArray[np.int64], column: Column) -> Column:

@@ -18,6 +18,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scenicq.budget import limited, look
 from scenicq.forest.build import constant
@@ -40,7 +41,7 @@ from scenicq.forest.nodes import (
     Value,
 )
 from scenicq.forest.scenario import Requirement, Scenario
-from scenicq.forest.walk import leaves, postorder, transform
+from scenicq.forest.walk import leaves, transform
 from scenicq.limits import LIMITS
 from scenicq.match.explanation import Finding
 from scenicq.match.matcher import Matcher
@@ -54,7 +55,7 @@ from scenicq.temporal.enclosures import Bounds, certainly, unchanging
 from scenicq.temporal.runs import Runs
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
-__all__ = ["Example", "Examples", "Remembered", "examine_start"]
+__all__ = ["Example", "Examples", "InitialScene", "Remembered"]
 
 Remembered = tuple[Label, Mapping[str, str]]
 """The label of a start, and its correspondence."""
@@ -73,22 +74,33 @@ _Case = tuple[Mapping[int, Truth], tuple[Node, ...], Sequence["Example"]]
 """What conditions are, what is assumed of them, and examples for which it is so."""
 
 
-def examine_start(
-    scenario: Scenario, match: MatchOptions, solver: Solver | None, start: Remembered, wanted: Node | None
-) -> Finding:
-    """Whether the label of a start matches the initial scene with its correspondence, and a condition besides.
+@dataclass(slots=True)
+class InitialScene:
+    """What the labels of starts are matched with, besides what the program says of time.
 
-    Args:
+    Attributes:
         scenario: The scenario; what it says of time is left out.
         match: Options of the matcher.
         solver: Decides what is not decided otherwise.
-        start: The start.
-        wanted: The condition, about the label at the start.
     """
-    label, correspondence = start
-    requirements = scenario.requirements if wanted is None else (*scenario.requirements, Requirement(wanted, None))
-    initial = replace(scenario, requirements=requirements, dynamics=None)
-    return Matcher(initial, match, solver).examine(label, correspondence)
+
+    scenario: Scenario
+    match: MatchOptions
+    solver: Solver | None
+    _plain: Matcher | None = None
+
+    def examine(self, start: Remembered, wanted: Node | None) -> Finding:
+        """Whether the label of a start matches with its correspondence, and a condition about it holds besides."""
+        if wanted is None:
+            self._plain = self._plain or self._matcher(self.scenario.requirements)
+            matcher = self._plain
+        else:
+            matcher = self._matcher((*self.scenario.requirements, Requirement(wanted, None)))
+        return matcher.examine(*start)
+
+    def _matcher(self, requirements: Sequence[Requirement]) -> Matcher:
+        initial = replace(self.scenario, requirements=tuple(requirements), dynamics=None)
+        return Matcher(initial, self.match, self.solver)
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,9 +123,7 @@ class Examples:
     """What the values of random variables can make of conditions, for one start.
 
     Attributes:
-        scenario: The scenario.
-        match: Options of the matcher.
-        solver: Decides what is not decided otherwise.
+        initial: What the label of the start is matched with.
         start: The start.
         columns: Over the samples.
         conditions: Those that hang on random variables, expanded, by number.
@@ -122,9 +132,7 @@ class Examples:
         found: Examples so far.
     """
 
-    scenario: Scenario
-    match: MatchOptions
-    solver: Solver | None
+    initial: InitialScene
     start: Remembered
     columns: AtomColumns
     conditions: Mapping[int, Node]
@@ -132,11 +140,14 @@ class Examples:
     decide: Callable[[Mapping[int, Truth]], Runs]
     found: list[Example] = field(default_factory=list[Example])
     _asked: int = 0
-    _alike: dict[int, list[int]] = field(init=False)
+    _alike: dict[int, NDArray[np.int64]] = field(init=False)
+    _observed: dict[int, NDArray[np.bool_]] = field(init=False)
 
     def __post_init__(self) -> None:
         """Find where a condition is the same question."""
-        self._alike = {number: self._first_alike(number) for number in self.conditions}
+        readings = {number: self.columns.readings(each) for number, each in self.conditions.items()}
+        self._observed = {number: each >= 0 for number, each in readings.items()}
+        self._alike = {number: _first_alike(each, self.first) for number, each in readings.items()}
 
     def outcomes(self) -> list[tuple[Runs, Example]] | None:
         """All that becomes of the run, each with an example, of which some may be unknown; None without any."""
@@ -167,7 +178,7 @@ class Examples:
                 if fit:
                     number, sample = place
                     more = {**known, number: known[number].copy()}
-                    more[number][[other == self._alike[number][sample] for other in self._alike[number]]] = truth
+                    more[number][self._alike[number] == self._alike[number][sample]] = truth
                     cases.append((more, further, fit))
                 elif answer is not False:
                     found.append((run, examples[0]))
@@ -183,7 +194,7 @@ class Examples:
                 for number in self.conditions
                 if known[number][sample] == UNKNOWN
                 and example.truth[number][sample] != UNKNOWN
-                and self._is_observed(number, sample)
+                and self._observed[number][sample]
             ),
             None,
         )
@@ -203,7 +214,7 @@ class Examples:
             otherwise = {
                 place: that
                 for place in asked
-                if self._is_observed(*place)
+                if self._observed[place[0]][place[1]]
                 and (that := self._that(*place, holds=bool(base[place[0]][place[1]] != TRUE))) is not None
             }
             open_ |= set(asked) - otherwise.keys()
@@ -226,7 +237,7 @@ class Examples:
                 stack += [block[: len(block) // 2], block[len(block) // 2 :]]
         certain = {number: truth.copy() for number, truth in base.items()}
         for number, sample in open_:
-            certain[number][[other == sample for other in self._alike[number]]] = UNKNOWN
+            certain[number][self._alike[number] == sample] = UNKNOWN
         return certain
 
     def _hanging(self) -> list[_Place]:
@@ -281,7 +292,7 @@ class Examples:
         return ends[0], ends[1]
 
     def _ask_briefly(self, wanted: Node) -> bool | None:
-        with limited(self.match.timeout_s * _SHARE):
+        with limited(self.initial.match.timeout_s * _SHARE):
             return self._ask(wanted)
 
     def _span(self, part: Node) -> Bounds:
@@ -295,7 +306,7 @@ class Examples:
         if self._asked >= LIMITS.start_questions:
             return None
         self._asked += 1
-        finding = examine_start(self.scenario, self.match, self.solver, self.start, wanted)
+        finding = self.initial.examine(self.start, wanted)
         verdict = finding.verdict
         if isinstance(verdict, NoMatch):
             return False
@@ -309,27 +320,6 @@ class Examples:
         self.found.append(Example(values, verdict.witness, truth))
         return True
 
-    def _first_alike(self, number: int) -> list[int]:
-        """For each sample the first one, from the start on, at which a condition reads the same, all of it observed."""
-        found: dict[tuple[Value, ...], int] = {}
-        samples = range(len(self.columns.samples))
-        return [
-            sample if sample < self.first or not self._is_observed(number, sample)
-            else found.setdefault(self._observed(number, sample), sample)
-            for sample in samples
-        ]  # fmt: skip
-
-    def _observed(self, number: int, sample: int) -> tuple[Value, ...]:
-        """What a condition reads at a sample; None of what is not observed."""
-        nodes = postorder((self.conditions[number],))
-        return tuple(
-            self.columns.observed(each, sample) for each in nodes if isinstance(each, Feature) and each.current
-        )
-
-    def _is_observed(self, number: int, sample: int) -> bool:
-        """Whether all that a condition reads is observed at a sample."""
-        return all(each is not None for each in self._observed(number, sample))
-
     def _that(self, number: int, sample: int, *, holds: bool) -> Node | None:
         """That a condition holds at a sample, or that it does not; None if that cannot be said."""
 
@@ -339,6 +329,15 @@ class Examples:
 
         here = transform(self.conditions[number], observed)
         return here if holds else untrue(here)
+
+
+def _first_alike(readings: NDArray[np.int64], first: int) -> NDArray[np.int64]:
+    """For each sample the first one, from the start on, at which a condition reads the same, all of it observed."""
+    found = np.arange(len(readings))
+    after = readings[first:]
+    _, where, which = np.unique(after, return_index=True, return_inverse=True)
+    found[first:] = np.where(after >= 0, first + where[which], found[first:])
+    return found
 
 
 def _assignment(variables: Sequence[Leaf], known: Mapping[Identity, Value]) -> Mapping[Identity, Value] | None:

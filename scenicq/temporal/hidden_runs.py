@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 from typing import cast
@@ -19,12 +18,11 @@ from scenicq.forest.walk import leaves
 from scenicq.limits import LIMITS
 from scenicq.match.options import MatchOptions
 from scenicq.match.verdict import Match, Unknown, WitnessValue
-from scenicq.smt.answer import Solver
 from scenicq.temporal.atoms import AtomColumns, UnclearVariable
 from scenicq.temporal.hidden import inside
 from scenicq.temporal.hidden_bounds import PossibleValues
 from scenicq.temporal.hidden_conditions import HiddenConditions
-from scenicq.temporal.hidden_examples import Example, Examples, Remembered, examine_start
+from scenicq.temporal.hidden_examples import Example, Examples, InitialScene, Remembered
 from scenicq.temporal.outcomes import place_of
 from scenicq.temporal.run_lanes import follow_runs
 from scenicq.temporal.run_machine import RunMachine
@@ -45,17 +43,23 @@ class HiddenRuns:
 
     Attributes:
         machine: What the program says about time.
-        scenario: The scenario.
-        match: Options of the matcher.
-        solver: Decides what is not decided otherwise.
+        initial: What the labels of starts are matched with.
         reasons: Whether somebody reads what runs fail at.
     """
 
     machine: RunMachine
-    scenario: Scenario
-    match: MatchOptions
-    solver: Solver | None
+    initial: InitialScene
     reasons: bool = True
+
+    @property
+    def scenario(self) -> Scenario:
+        """The scenario."""
+        return self.initial.scenario
+
+    @property
+    def match(self) -> MatchOptions:
+        """Options of the matcher."""
+        return self.initial.match
 
     def follow(
         self, stretches: Stretches, columns: AtomColumns, expanded: Sequence[Node],
@@ -129,14 +133,21 @@ class HiddenRuns:
     ) -> Runs:  # fmt: skip
         """The runs by those values of hidden numbers with which they may match, or by all."""
         pieces = follow_runs(self.machine, stretches, columns.reader(expanded), hidden, possible)
-        self._confirm(pieces, stretches, columns, expanded, hidden)
-        order = np.lexsort((*pieces.low.T[::-1], -pieces.ends, -pieces.truth.astype(np.int64), pieces.of))
         shared = {leaf.identity for leaf in leaves(*roots_of(replace(self.scenario, dynamics=None)))}
         joint = [place for place, leaf in enumerate(hidden.variables) if leaf.identity in shared]
+        thin = _thin(pieces)
+        doubted = thin & (pieces.truth == TRUE)
+        if not joint:
+            # where other values prove the same, nothing hangs on these
+            width = int(pieces.ends.max(initial=0)) + 1
+            proved = np.unique((pieces.of * width + pieces.ends)[~thin & (pieces.truth == TRUE)])
+            doubted &= ~np.isin(pieces.of * width + pieces.ends, proved)
+        self._confirm(pieces, np.flatnonzero(doubted), stretches, expanded, hidden)
+        order = np.lexsort((*pieces.low.T[::-1], thin, -pieces.ends, -pieces.truth.astype(np.int64), pieces.of))
         firsts = np.flatnonzero(np.diff(pieces.of[order], prepend=-1))
         every = np.arange(len(stretches.starts))
         if joint:
-            found = self._again(pieces, np.split(order, firsts[1:]), hidden, joint, stretches, remember)
+            found = self._again(pieces, order, firsts, hidden, joint, stretches, remember)
             return found.at(every, np.arange(len(stretches)))
         matches = order[pieces.truth[order] == TRUE]
         # one piece for each end
@@ -144,18 +155,15 @@ class HiddenRuns:
         kept = np.zeros(len(pieces), np.bool_)
         kept[order[firsts]] = kept[matches[new]] = True
         for each in cast("list[int]", matches[new].tolist()):
-            pieces.details[each] = "", _witness(hidden, pieces, each)
+            pieces.details[each] = "", _Witness(hidden, pieces, each)
         return pieces.some(order[kept[order]]).at(every, np.arange(len(stretches)))
 
     def _confirm(
-        self, pieces: Runs, stretches: Stretches, columns: AtomColumns, expanded: Sequence[Node],
+        self, pieces: Runs, doubted: NDArray[np.intp], stretches: Stretches, expanded: Sequence[Node],
         hidden: HiddenConditions,
     ) -> None:  # fmt: skip
-        """Follow runs again with a value each where so few values match that rounding may decide."""
-        with np.errstate(invalid="ignore"):
-            narrow: NDArray[np.bool_] = pieces.high - pieces.low <= _THIN * (1 + np.abs(pieces.low))
-        thin = np.any(narrow, axis=1)
-        for each in np.flatnonzero(thin & (pieces.truth == TRUE)).tolist():
+        """Follow some runs again with a value each; what is no match then is none."""
+        for each in cast("list[int]", doubted.tolist()):
             look()
             start = int(pieces.of[each])
             one = stretches.alone(start)
@@ -175,7 +183,7 @@ class HiddenRuns:
             return self._run(one, columns, expanded, known)
 
         first = int(one.starts[0])
-        asked = Examples(self.scenario, self.match, self.solver, start, columns, hanging, first, decide)
+        asked = Examples(self.initial, start, columns, hanging, first, decide)
         outcomes: list[tuple[Runs, Example]] | None = None
         try:
             with limited(self.match.timeout_s):
@@ -200,25 +208,38 @@ class HiddenRuns:
         return follow_runs(self.machine, one, columns.reader(expanded, known))
 
     def _again(
-        self, pieces: Runs, groups: Sequence[NDArray[np.int64]], hidden: HiddenConditions, joint: Sequence[int],
-        stretches: Stretches, remember: Callable[[int], Remembered],
+        self, pieces: Runs, order: NDArray[np.int64], firsts: NDArray[np.int64], hidden: HiddenConditions,
+        joint: Sequence[int], stretches: Stretches, remember: Callable[[int], Remembered],
     ) -> Runs:  # fmt: skip
-        """Match starts again with the values of random variables that the initial scene has, too."""
-        numbers = cast("list[int]", stretches.numbers.tolist())
-        stretch_of = np.searchsorted(stretches.bounds, stretches.starts, side="right")
-        asked: Counter[int] = Counter()
-        found: list[Runs] = []
-        for group in groups:
-            start, best = int(pieces.of[group[0]]), pieces.some(group[:1])
-            if best.truth[0] == FALSE:
-                found.append(best)
-                continue
-            asked[int(stretch_of[start])] += 1
-            if asked[int(stretch_of[start])] > LIMITS.joint_starts:
-                found.append(best.with_detail("budget", truth=int(UNKNOWN)))
-            else:
-                found.append(self._jointly(remember(numbers[start]), pieces, group, hidden, joint))
-        return Runs.joined(found)
+        """Match starts again with the values of random variables that the initial scene has, too.
+
+        Args:
+            pieces: The runs.
+            order: Their order, those of each start from the best one on.
+            firsts: Where in it each start's begin.
+            hidden: What hangs on hidden numbers.
+            joint: Those numbers that the initial scene has, too.
+            stretches: Stretches with their starts.
+            remember: The label of a start by its number.
+        """
+        best = order[firsts]
+        open_ = np.flatnonzero(pieces.truth[best] != FALSE)
+        stretch_of = np.searchsorted(stretches.bounds, stretches.starts[pieces.of[best[open_]]], side="right")
+        before = np.arange(len(open_)) - np.searchsorted(stretch_of, stretch_of)
+        asked = open_[before < LIMITS.joint_starts]
+        rest = open_[before >= LIMITS.joint_starts]
+        found = [
+            pieces.some(best[pieces.truth[best] == FALSE]),
+            pieces.some(best[rest]).with_detail("budget", truth=int(UNKNOWN)),
+        ]
+        ends = np.append(firsts[1:], len(order))
+        for each in cast("list[int]", asked.tolist()):
+            look()
+            group = order[firsts[each] : ends[each]]
+            number = int(stretches.numbers[pieces.of[group[0]]])
+            found.append(self._jointly(remember(number), pieces, group, hidden, joint))
+        runs = Runs.joined(found)
+        return runs.some(np.argsort(runs.of, kind="stable"))
 
     def _jointly(
         self, start: Remembered, pieces: Runs, group: NDArray[np.int64], hidden: HiddenConditions, joint: Sequence[int]
@@ -232,18 +253,25 @@ class HiddenRuns:
             if truth == FALSE or (found and truth == UNKNOWN):
                 break
             within = _within(hidden, pieces, joint, same)
-            finding = examine_start(self.scenario, self.match, self.solver, start, within)
+            finding = self.initial.examine(start, within)
             verdict = finding.verdict
             if isinstance(verdict, Match):
                 known = finding.values()
                 values = [known.get(hidden.variables[variable].identity) for variable in joint]
                 held = next((each for each in same if _holds(pieces, each, joint, values)), same[0])
-                found.append(pieces.some(np.array([held])).with_detail("", _witness(hidden, pieces, held)))
+                found.append(pieces.some(np.array([held])).with_detail("", _Witness(hidden, pieces, held)))
             if isinstance(verdict, Unknown) and undecided is None:
                 undecided = pieces.some(np.array(same[:1])).with_detail(verdict.reason, truth=int(UNKNOWN))
         if found:
             return Runs.joined(found)
         return pieces.some(group[-1:]).with_detail("", truth=int(FALSE)) if undecided is None else undecided
+
+
+def _thin(pieces: Runs) -> NDArray[np.bool_]:
+    """Whether so few values are in a piece that rounding may decide, for each."""
+    with np.errstate(invalid="ignore"):
+        narrow: NDArray[np.bool_] = pieces.high - pieces.low <= _THIN * (1 + np.abs(pieces.low))
+    return np.any(narrow, axis=1)
 
 
 def _one_each(matches: Sequence[Runs]) -> list[Runs]:
@@ -258,10 +286,35 @@ def _values(hidden: HiddenConditions, pieces: Runs, number: int) -> dict[Identit
     return {leaf.identity: inside(*each) for leaf, each in zip(hidden.variables, ends, strict=True)}
 
 
-def _witness(hidden: HiddenConditions, pieces: Runs, number: int) -> dict[str, WitnessValue]:
-    """The same by their places in the program."""
-    values = _values(hidden, pieces, number)
-    return {place_of(leaf): cast("float", values[leaf.identity]) for leaf in hidden.variables}
+@dataclass(frozen=True, eq=False, slots=True)
+class _Witness(Mapping[str, WitnessValue]):
+    """A value of each hidden number in a piece, by its place in the program; worked out where somebody reads it.
+
+    Attributes:
+        hidden: The hidden numbers.
+        pieces: The runs.
+        number: Which of them.
+    """
+
+    hidden: HiddenConditions
+    pieces: Runs
+    number: int
+
+    def __getitem__(self, place: str) -> WitnessValue:
+        """The value of the number at a place."""
+        return self._values()[place]
+
+    def __iter__(self) -> Iterator[str]:
+        """The places."""
+        return iter(self._values())
+
+    def __len__(self) -> int:
+        """How many there are."""
+        return len(self._values())
+
+    def _values(self) -> dict[str, WitnessValue]:
+        values = _values(self.hidden, self.pieces, self.number)
+        return {place_of(leaf): cast("float", values[leaf.identity]) for leaf in self.hidden.variables}
 
 
 def _within(hidden: HiddenConditions, pieces: Runs, joint: Sequence[int], some: Sequence[int]) -> Node:

@@ -16,6 +16,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
+from scenicq.budget import look
 from scenicq.errors import Span
 from scenicq.forest.condition import expand
 from scenicq.forest.nodes import Node
@@ -28,6 +29,7 @@ from scenicq.store.track_block import TrackReach
 from scenicq.store.tracks import TrackKey
 from scenicq.temporal.atoms import AtomColumns, reads_start
 from scenicq.temporal.hidden import random_variables
+from scenicq.temporal.hidden_examples import InitialScene
 from scenicq.temporal.hidden_runs import HiddenRuns, Remembered
 from scenicq.temporal.interval_options import IntervalOptions
 from scenicq.temporal.outcomes import Outcome, outcomes_of, steady_value
@@ -185,6 +187,7 @@ class IntervalMatcher:
             some = stretches if len(chosen_) == len(stretches.labels) else stretches.some(chosen_)
             columns = AtomColumns(program.scenario, some.places, start=some.heads())
             expanded = [columns.expanded(condition) for condition in dynamics.conditions]
+            look()
             runs = self._dynamic(program, some, columns, expanded, remember)
             _tell_budget(runs, some, columns)
             yield some, runs
@@ -195,7 +198,8 @@ class IntervalMatcher:
     ) -> Runs:  # fmt: skip
         assert program.machine is not None
         if random_variables(expanded):
-            hidden = HiddenRuns(program.machine, program.scenario, self.match, self.solver, self.reasons)
+            initial = InitialScene(program.scenario, self.match, self.solver)
+            hidden = HiddenRuns(program.machine, initial, self.reasons)
             return hidden.follow(stretches, columns, expanded, remember)
         return follow_runs(program.machine, stretches, columns.reader(expanded))
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from scenicq.budget import look
 from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.groups import PARAMS, Condition
 from scenicq.forest.nodes import Value
@@ -302,6 +303,7 @@ class StartSearch:
             if len(forms) < len(plan.groups) or not _in_order(block, plan, ordered, chosen):
                 continue
             for first in range(0, len(chosen), _AT_ONCE):
+                look()
                 some = chosen[first : first + _AT_ONCE]
                 holds[some], fails[some] = self._decided(places.at(some), forms)
         return holds, fails, ordered

@@ -135,14 +135,14 @@ terminate when (distance to spot) > 40
 def test_bounds_of_the_point_answer_for_samples_side_by_side(crossroads, monkeypatch):
     """The matcher is asked for them, and hardly ever for one sample and its likes."""
     asked: list[Node] = []
-    examine = hidden_examples.examine_start
+    examine = hidden_examples.InitialScene.examine
 
-    def counted(scenario, match, solver, start, wanted):
+    def counted(initial, start, wanted):
         if wanted is not None:
             asked.append(wanted)
-        return examine(scenario, match, solver, start, wanted)
+        return examine(initial, start, wanted)
 
-    monkeypatch.setattr(hidden_examples, "examine_start", counted)
+    monkeypatch.setattr(hidden_examples.InitialScene, "examine", counted)
     options = QueryOptions(solver="portable", every=True)
     results = list(Query(open_dataset(crossroads), Source("program.scenic", FOLLOWED), options).results())
     assert not [each for each in results if isinstance(each.verdict, Unknown)]

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from scenicq.budget import deadline
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.unobserved import MOTION
 from scenicq.geometry.network import Network
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.constraints import relevant_properties
 from scenicq.match.verdict import Match, Verdict
-from scenicq.query.execution.deadline import check_deadline
 from scenicq.query.execution.lazy_solver import LazySolver
 from scenicq.query.execution.results import Result
 from scenicq.query.prefilter.decision import decided_frames
@@ -106,7 +106,7 @@ class Decider:
         proofs: Whether somebody reads the values that prove matches over time.
         reasons: Whether somebody reads what frames and bindings fail at in a query over time.
         time: Options of a query over time.
-        until: When the time is over; see `check_deadline`.
+        until: When the time is over; see `budget.deadline`.
     """
 
     dataset: Dataset
@@ -151,7 +151,20 @@ class Decider:
             ScenarioError: The program does not fit the map.
             DeadlineError: The time is over; while results are taken, too.
         """
-        check_deadline(self.until)
+        with deadline(self.until):
+            decided = self._decide(block)
+        return decided if self.until is None else replace(decided, found=self._in_time(iter(decided.found)))
+
+    def _in_time(self, found: Iterator[list[Result]]) -> Iterator[list[Result]]:
+        """What is found before the time is over, which is looked at while each is looked for."""
+        while True:
+            with deadline(self.until):
+                each = next(found, None)
+            if each is None:
+                return
+            yield each
+
+    def _decide(self, block: Block) -> Decided:
         connection = self.connection
         if block.map not in self._compiled:
             self._compiled[block.map] = self.compile_map(block.map)
@@ -175,10 +188,7 @@ class Decider:
         open_ = np.array([number for number, sure, *_ in rows if not sure], dtype=np.int64)
         asked = self._matched(compiled, self._left(compiled, open_) if len(open_) else iter(()))
         proved, none = Match({}, {}), dict[str, str]()
-        until = self.until
         for _, sure, frame, recording, time in rows:
-            if until is not None:
-                check_deadline(until)
             yield [Result(frame, recording, time, proved, none)] if sure else next(asked)
 
     def _left(self, compiled: CompiledMap, among: NDArray[np.int64] | None = None) -> Iterator[Candidate]:
@@ -266,12 +276,9 @@ class Decider:
         while batch := list(islice(left, size)):
             if self.all_matches:
                 for label, among in batch:
-                    check_deadline(self.until)
                     yield [_result(label, verdict) for verdict in _every_match(matcher, label, among)]
             else:
                 for (label, _), verdict in zip(batch, matcher.match_all(batch, details=self.every), strict=True):
-                    if self.until is not None:
-                        check_deadline(self.until)
                     yield [_result(label, verdict)]
             size = _BATCH
 

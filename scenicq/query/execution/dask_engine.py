@@ -28,10 +28,10 @@ from pathlib import Path
 from typing import Any
 
 from scenicq import __version__
+from scenicq.budget import time_left_s
 from scenicq.errors import DataError, Diagnostic
 from scenicq.limits import LIMITS
 from scenicq.processes import processors
-from scenicq.query.execution.deadline import time_left_s
 from scenicq.query.execution.partitions import Partition
 from scenicq.query.execution.run import Query
 from scenicq.query.execution.shards import Done, Engine, Progress, Question, alone, run_shard

@@ -8,9 +8,9 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from scenicq.budget import DeadlineError
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown
 from scenicq.query.execution.block_matcher import Decided
-from scenicq.query.execution.deadline import DeadlineError
 from scenicq.query.execution.results import Funnel, Result
 from scenicq.query.prefilter.plan import Plan
 

@@ -10,6 +10,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
+from scenicq.budget import look
 from scenicq.errors import Span
 from scenicq.match.matcher import Matcher
 from scenicq.match.problem.constraints import relevant_properties
@@ -166,7 +167,9 @@ class RecordingMatcher:
         if not len(left.labels):
             return found
         players = None if left.rows is None else left.rows.rows
+        look()
         with TrackBlock(self.dataset, rows.part, rows.runs, players, self.intervals.reach) as block:
+            look()
             labels = left.labels - block.first_label
             candidates = self._candidates(block, labels, left)
             if candidates is not None and self._necessary is not None:
@@ -186,6 +189,7 @@ class RecordingMatcher:
                 return label_of(self.matcher.scenario, block, members, rows.map, self._relevant)
 
             reported = self.intervals.intervals(table, remember, every=self.every)
+            look()
             intervals = reported.intervals
             found.counts["bindings"] += reported.bindings
             found.counts["cut off"] += sum(each.cut_off and each.broken is None for each in intervals)
@@ -230,6 +234,7 @@ class RecordingMatcher:
         codes, classes = block.categories()
         own: list[int] = np.unique(codes[block.ego(labels)]).tolist()
         if candidates is not None and all(classes[code] for code in own):
+            look()
             starts = search.decide(block, candidates)
             arrays, candidates, sure = starts.members, starts.left, starts.sure
             labels = candidates.labels
@@ -239,6 +244,7 @@ class RecordingMatcher:
         known_starts: dict[int, Counter[str]] = {}
         read = asked.read(labels + block.first_label) if len(labels) else iter(())
         for at, candidate, members, among, known in self._asked(block, labels, candidates, sure, read):
+            look()
             matcher = search.rest if known else search.matcher
             label = candidate.label
             recording = int(block.recording_of[at])

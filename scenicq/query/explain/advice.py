@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from scenicq.budget import limited, time_is_up
+from scenicq.budget import limited, time_is_up, time_left_s
 from scenicq.errors import Span
 from scenicq.forest.kinds import kind_of
 from scenicq.forest.scenario import Scenario
@@ -29,7 +29,6 @@ from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import Tolerance
 from scenicq.match.verdict import Match, Unknown
 from scenicq.query.execution.block_matcher import CompiledMap
-from scenicq.query.execution.deadline import time_left_s
 from scenicq.query.execution.lazy_solver import LazySolver
 from scenicq.query.execution.run import MAP_LACKS, Query
 from scenicq.query.explain.nearest_miss import show_tolerance

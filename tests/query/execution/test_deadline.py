@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import itertools
+import math
 import re
+import time
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from scenicq import budget
 from scenicq.match.options import MatchOptions
-from scenicq.query.execution import deadline
 from scenicq.query.execution.partitions import fingerprint
 from scenicq.query.execution.program_files import read_program
 from scenicq.query.execution.records import record
@@ -28,11 +29,26 @@ def dataset(crossroads: Path) -> Dataset:
     return open_dataset(crossroads)
 
 
+class Clock:
+    """A clock that goes on by a second whenever somebody looks whether the time is over."""
+
+    def __init__(self) -> None:
+        """Begin at 0."""
+        self.now = 0
+
+    def monotonic(self) -> float:
+        self.now += 1
+        return float(self.now)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(time, name)
+
+
 @pytest.fixture
-def clock(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A clock that goes on by a second whenever it is looked at."""
-    seconds = itertools.count()
-    monkeypatch.setattr(deadline, "monotonic", lambda: float(next(seconds)))
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    found = Clock()
+    monkeypatch.setattr(budget, "time", found)
+    return found
 
 
 def query(dataset: Dataset, **changes: Any) -> Query:
@@ -43,10 +59,11 @@ def records(found: Query) -> list[dict[str, Any]]:
     return [record(result) for result in found.results()]
 
 
-@pytest.mark.usefixtures("clock")
-def test_what_is_decided_in_time_is_out_and_the_rest_is_not_counted(dataset: Dataset) -> None:
-    whole, cut = query(dataset), query(dataset, until=8.0)
-    every, some = records(whole), records(cut)
+def test_what_is_decided_in_time_is_out_and_the_rest_is_not_counted(dataset: Dataset, clock: Clock) -> None:
+    whole = query(dataset, until=math.inf)
+    every = records(whole)
+    cut = query(dataset, until=clock.now * 1.5)
+    some = records(cut)
     assert 0 < len(some) < len(every)
     assert some == every[: len(some)]
     assert cut.funnel.frames == len(some)
@@ -61,15 +78,13 @@ def test_nothing_is_begun_when_the_time_is_over(dataset: Dataset, jobs: int) -> 
     assert late.funnel.frames == 0
 
 
-@pytest.mark.usefixtures("clock")
-def test_whole_pieces_are_kept_and_a_later_run_does_the_others(dataset: Dataset, tmp_path: Path) -> None:
-    # each frame, and each block, is a second
-    first = query(dataset, until=shards_of(query(dataset), 16)[0].frames + 4.0)
+def test_whole_pieces_are_kept_and_a_later_run_does_the_others(dataset: Dataset, clock: Clock, tmp_path: Path) -> None:
+    every = records(query(dataset, until=math.inf))
+    first = query(dataset, until=clock.now * 1.5)
     some = [record(each) for each in in_order(first, kept(run_here, tmp_path), shards_of(first, 16), lambda _: None)]
     pieces = len(list(tmp_path.iterdir()))
     second = query(dataset)
     rest = [record(each) for each in in_order(second, kept(run_here, tmp_path), shards_of(second, 16), lambda _: None)]
-    every = records(query(dataset))
     assert 0 < pieces < len(shards_of(second, 16))
     assert some == every[: len(some)]
     assert rest == every
