@@ -110,6 +110,7 @@ class _Asked:
         real: Whether the maps are real ones, rather than a street that stands in.
         strict: Whether warnings of what cannot be meant are errors.
         model: The world model of a program that imports none.
+        map_defaults: Whether the world model places and turns what the program does not.
     """
 
     options: MatchOptions
@@ -117,6 +118,7 @@ class _Asked:
     real: bool
     strict: bool
     model: str | None
+    map_defaults: bool
 
 
 def _found(
@@ -135,7 +137,14 @@ def _found(
         try:
             loader = SiblingFiles(Path(source.name))
             scenario = compile_scenario(
-                source, network, version=version, initial=initial, behaviors="ignore", loader=loader, model=asked.model
+                source,
+                network,
+                version=version,
+                initial=initial,
+                behaviors="ignore",
+                loader=loader,
+                model=asked.model,
+                map_defaults=asked.map_defaults,
             )
         except ScenarioError as error:
             if asked.dataset is not None:
@@ -181,6 +190,9 @@ def _found(
 @PROGRAM_TEXT
 @click.option("--map", "map_file", metavar="FILE", type=click.Path(path_type=Path), help="A GeoJSON or OpenDRIVE map.")
 @click.option("--scenic", type=click.Choice(["1", "2", "3"]), help="Version of Scenic.  [default: inferred]")
+@click.option("--map-defaults/--no-map-defaults", default=True,
+              help="Whether the world model places and turns what the program does not: a car on the road, along it. "
+              "Without a map it never does.")  # fmt: skip
 @click.option("--initial", is_flag=True, help="Ignore behaviors and other dynamic parts.")
 @click.option("--forest", is_flag=True, help="Print the expression forest.")
 @click.option("--groups", is_flag=True, help="Print the groups of jointly dependent constraints, in order.")
@@ -196,8 +208,8 @@ def _found(
 )
 @click.pass_context
 def check(ctx: click.Context, scenario: str | None, dataset: str | None, *, program: str | None, map_file: Path | None,
-          scenic: str | None, initial: bool, forest: bool, groups: bool, classes: Literal["fine", "coarse"],
-          strict: bool, format_: str) -> None:  # fmt: skip
+          scenic: str | None, map_defaults: bool, initial: bool, forest: bool, groups: bool,
+          classes: Literal["fine", "coarse"], strict: bool, format_: str) -> None:  # fmt: skip
     """Say whether a scenario is sound, and how it is read.
 
     It warns of what compiles but cannot be meant, such as an angle of 90 without `deg`, and with a dataset also of what
@@ -213,7 +225,14 @@ def check(ctx: click.Context, scenario: str | None, dataset: str | None, *, prog
         source, (target,), model = given_program(ctx, program, (scenario, dataset))
         networks = networks_of(target, map_file, source, version, warnings)
         opened = None if target is None else open_checked(target)
-        asked = _Asked(MatchOptions(classes=classes), opened, opened is not None or map_file is not None, strict, model)
+        asked = _Asked(
+            MatchOptions(classes=classes),
+            opened,
+            opened is not None or map_file is not None,
+            strict,
+            model,
+            map_defaults,
+        )
         lines, diagnostics = _found(source, networks, version, initial, details, asked)
         diagnostics += warnings
     except ScenicqError as error:

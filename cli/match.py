@@ -140,6 +140,9 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
               help="Write a page with pictures of the matches, too: DIR/index.html.")
 @SENSORS
 @click.option("--scenic", type=option_type("scenic"), help="Version of Scenic.  [default: inferred]")
+@click.option("--map-defaults/--no-map-defaults", default=True,
+              help="Whether the world model places and turns what the program does not: a car on the road, along it. "
+              "Without a map it never does.")  # fmt: skip
 @click.option("--initial", is_flag=True, help="Ignore behaviors and other dynamic parts: match the initial scene.")
 @click.option("--behaviors", type=click.Choice(["ignore"]), help="ignore leaves behaviors out and matches the rest of "
               "a dynamic program over time.")

@@ -28,7 +28,7 @@ def remarks(query: Query, maps: Sequence[str] | None = None) -> tuple[list[Diagn
     Raises:
         ScenarioError: The program is wrong, or the options are strict and there is anything to be said.
     """
-    unseen = [*(query.misfits() if maps is None else ()), *query.coverage(maps).warnings]
+    unseen = [*(query.misfits() if maps is None else ()), *query.notes(maps), *query.coverage(maps).warnings]
     found = lint_query(query, maps)
     if query.options.strict and found:
         raise ScenarioError([replace(each, severity="error") for each in found])

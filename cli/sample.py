@@ -53,13 +53,17 @@ __all__ = ["sample"]
     help="Seconds of the processor for one scene.",
 )
 @click.option("--scenic", type=option_type("scenic"), help="Version of Scenic.  [default: inferred]")
+@click.option("--map-defaults/--no-map-defaults", default=True,
+              help="Whether the world model places and turns what the program does not: a car on the road, along it. "
+              "Without a map it never does.")  # fmt: skip
 @click.option("--initial", is_flag=True, help="Ignore behaviors and other dynamic parts.")
 @click.option("-o", "--output", metavar="DIR", type=click.Path(path_type=Path),
               help="Write an interchange folder with labels and map, to be ingested.")  # fmt: skip
 @click.pass_context
 def sample(ctx: click.Context, scenario: str | None, dataset: str | None, *, program: str | None,
            map_file: Path | None, number: int, seed: int,
-           waive: str, timeout: float, scenic: str | None, initial: bool, output: Path | None) -> None:  # fmt: skip
+           waive: str, timeout: float, scenic: str | None, map_defaults: bool, initial: bool,
+           output: Path | None) -> None:  # fmt: skip
     """Draw scenes from a scenario, as labels.
 
     They have the distribution of the program, given that all requirements hold, those that Scenic adds included. On
@@ -70,7 +74,13 @@ def sample(ctx: click.Context, scenario: str | None, dataset: str | None, *, pro
     version = read_version(scenic)
     network = next(networks_of(target, map_file, source, version))
     compiled = compile_scenario(
-        source, network, version=version, initial=initial, loader=SiblingFiles(Path(source.name)), model=model
+        source,
+        network,
+        version=version,
+        initial=initial,
+        loader=SiblingFiles(Path(source.name)),
+        model=model,
+        map_defaults=map_defaults,
     )
     labels = sample_labels(compiled, number, seed, read_built_ins(waive), timeout_s=timeout)
     if output is not None:

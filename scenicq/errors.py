@@ -53,6 +53,7 @@ CODES: dict[str, str] = {
     "impossible-requirement": "a requirement that no scene satisfies",
     "budget-exceeded": "the program takes too many steps or too much memory",
     "runtime-error": "evaluating the program failed",
+    "no-map": "without a map, objects may be anywhere and head anywhere where the program says nothing else",
     "map-lacks": "the map of the dataset has no element of the needed kind",
     "option-invalid": "an option has a value that cannot be used",
     # the data
@@ -105,6 +106,11 @@ CODES: dict[str, str] = {
     "range-reversed": "a range whose first end is above its second",
     "requirement-always": "a requirement that holds in every scene",
     "requirement-never": "a requirement that holds in no scene",
+    "angle-without-abs": "an angle with a sign that is compared as if it had none",
+    "choice-of-two": "a choice of two numbers where what lies between them may be meant",
+    "condition-alone": "a condition on a line of its own, which asks nothing",
+    "ego-twice": "two objects that are both made the ego",
+    "speed-beyond-roads": "a speed that no road sees, which may be meant in km/h",
     "box-cannot-fit": "a region that is too small for the object that must lie in it",
     "class-folded": "a class that coarse classes do not tell from others",
     "unknown-property": "a property that no class has and nothing reads",
@@ -211,7 +217,7 @@ class Diagnostic:
         label: Why this place, printed beside the caret.
         notes: Other places.
         hints: Statements that one can act on.
-        severity: "error" or "warning".
+        severity: "error", "warning" or "note".
     """
 
     code: str

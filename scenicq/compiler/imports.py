@@ -39,8 +39,19 @@ class Modules:
         base: The names of the language.
     """
 
-    def __init__(self, network: Network, version: int, initial: bool, loader: Loader | None) -> None:
-        """Take the map, the version of Scenic, whether dynamic parts are ignored, and what reads files."""
+    def __init__(
+        self, network: Network, version: int, initial: bool, loader: Loader | None, *, map_defaults: bool
+    ) -> None:
+        """Take the map, the version of Scenic, whether dynamic parts are ignored, and what reads files.
+
+        Args:
+            network: The map.
+            version: The version of Scenic.
+            initial: Whether dynamic parts are ignored.
+            loader: Reads files.
+            map_defaults: See `library_text`.
+        """
+        self._map_defaults = map_defaults
         self.interpreter = Interpreter(version, initial, self._import, network)
         functions = sequence_functions(self.interpreter) | operator_functions(self.interpreter)
         names = language_names() | functions | root_classes(version)
@@ -148,7 +159,7 @@ class Modules:
         records = {"_record": Builtin("_record", _record), "_module": Builtin("_module", _module)}
         scope = Environment(network_names(self._network, files[-1]) | records, self.base, library=True)
         for file in files:
-            self.interpreter.run(library_text(file).body, scope)
+            self.interpreter.run(library_text(file, map_defaults=self._map_defaults).body, scope)
         return Module(name, {key: value for key, value in scope.names.items() if not key.startswith("_")})
 
     def _package(self, name: str) -> Module | None:

@@ -8,6 +8,7 @@ over time has no meaning at one instant. The driving domain itself has CARLA's c
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from functools import cache
 from importlib import resources
 
@@ -32,9 +33,11 @@ from scenicq.geometry.network import Network
 from scenicq.geometry.regions import union
 from scenicq.syntax import ast
 from scenicq.syntax.parser import parse
+from scenicq.syntax.walk import walk
 
 __all__ = [
     "default_library",
+    "is_anywhere",
     "is_dynamic",
     "is_package",
     "libraries_of",
@@ -80,11 +83,54 @@ _ELEMENTS = (
 _ROAD_TYPES: dict[str, ModelValue] = {"ManeuverType": MANEUVER_TYPES, **{cls.__name__: cls for cls in _ELEMENTS}}
 
 
+_ANYWHERE = {"position": "new Point in everywhere", "heading": "Range(0, 360) deg", "regionContainedIn": "everywhere"}
+"""The defaults of places and directions where no map has any."""
+_MAP_NAMES = frozenset({"network", "road", "roadDirection", "roadOrShoulder", "curb", "sidewalk", "walkway"})
+
+
 @cache
-def library_text(name: str) -> ast.Program:
-    """The syntax of one of the library's files."""
+def _anywhere() -> dict[str, ast.Expression]:
+    text = "\n".join(["class Anywhere:", *(f"    {name}: {value}" for name, value in _ANYWHERE.items())])
+    (definition,) = parse(Source("<anywhere>", text), 3).body
+    assert isinstance(definition, ast.ClassDef)
+    return {each.name: each.value for each in definition.body if isinstance(each, ast.PropertyDefault)}
+
+
+def is_anywhere(default: ast.Expression | None) -> bool:
+    """Whether the default of a property is one that stands for what the map lacks."""
+    return any(default is each for each in _anywhere().values())
+
+
+@cache
+def library_text(name: str, *, map_defaults: bool = True) -> ast.Program:
+    """The syntax of one of the library's files.
+
+    Args:
+        name: The file.
+        map_defaults: Whether classes place and turn their objects as the map has it; else they may be anywhere and
+            head anywhere.
+    """
     text = resources.files("scenicq.compiler").joinpath("library", f"{name}.scenic").read_text(encoding="utf-8")
-    return parse(Source(f"<{name}.scenic>", text), 3)
+    program = parse(Source(f"<{name}.scenic>", text), 3)
+    return program if map_defaults else replace(program, body=tuple(map(_without_map, program.body)))
+
+
+def _without_map(statement: ast.Statement) -> ast.Statement:
+    """A statement of a library in which no class asks anything of the map."""
+    if not isinstance(statement, ast.ClassDef):
+        return statement
+    anywhere = _anywhere()
+    body = (
+        replace(each, value=anywhere[each.name])
+        if isinstance(each, ast.PropertyDefault) and each.name in anywhere and _names_of(each.value) & _MAP_NAMES
+        else each
+        for each in statement.body
+    )
+    return replace(statement, body=tuple(body))
+
+
+def _names_of(expression: ast.Expression) -> set[str]:
+    return {each.id for each in walk(expression) if isinstance(each, ast.Name)}
 
 
 def libraries_of(name: str) -> tuple[str, ...]:

@@ -12,7 +12,7 @@ from typing import TypeVar, cast
 
 from scenicq.budget import Exhausted, limited
 from scenicq.compiler import operators
-from scenicq.compiler.absent import check_directions
+from scenicq.compiler.absent import check_directions, listed
 from scenicq.compiler.arithmetic import no_number
 from scenicq.compiler.coerce import PARTIAL, to_node, to_region, to_scalar, to_vector
 from scenicq.compiler.deviations import is_zero
@@ -20,7 +20,7 @@ from scenicq.compiler.environment import Environment
 from scenicq.compiler.imported_files import Loader
 from scenicq.compiler.imports import Modules
 from scenicq.compiler.interpreter import Interpreter
-from scenicq.compiler.models import default_library
+from scenicq.compiler.models import default_library, is_anywhere
 from scenicq.compiler.requirements import RequireStatement
 from scenicq.compiler.temporal import Behaviors, TimedStatements
 from scenicq.compiler.values import Choice, Instance, ModelValue, fail, is_node
@@ -49,6 +49,7 @@ def compile_scenario(
     behaviors: Behaviors | None = None,
     loader: Loader | None = None,
     model: str | None = None,
+    map_defaults: bool = True,
 ) -> Scenario:
     """Compile a program against a map.
 
@@ -61,6 +62,8 @@ def compile_scenario(
             instant, and all dynamic parts are refused or ignored.
         loader: Reads files that the program imports.
         model: The world model of a program that imports none, as Scenic's `--model`.
+        map_defaults: Whether the world model's classes place and turn their objects as the map has it, where nothing
+            else does. Without a map they never do, and the scenario's warnings say so.
 
     Raises:
         ScenarioError: The program is wrong or uses what is not supported.
@@ -68,7 +71,10 @@ def compile_scenario(
     try:
         with limited(LIMITS.program_seconds):
             timed = None if initial or behaviors is None else TimedStatements(behaviors)
-            return _compiled(source, network, version, initial=initial, timed=timed, loader=loader, model=model)
+            return _compiled(
+                source, network, version, initial=initial, timed=timed, loader=loader, model=model,
+                map_defaults=map_defaults,
+            )  # fmt: skip
     except Exhausted:
         what = f"evaluating the program takes more than {LIMITS.program_seconds:g} s"
         raise fail("budget-exceeded", what, _start(source), "",
@@ -84,10 +90,11 @@ def _compiled(
     timed: TimedStatements | None,
     loader: Loader | None,
     model: str | None,
+    map_defaults: bool,
 ) -> Scenario:
     module = parse(source, version)
     chosen = decide_version(module)
-    world = Modules(network, chosen, initial, loader)
+    world = Modules(network, chosen, initial, loader, map_defaults=map_defaults and bool(network.features))
     run = world.interpreter
     run.timed = timed
     try:
@@ -95,9 +102,10 @@ def _compiled(
         names = {} if library is None else dict(world.load(library, _start(source)).names)
         scope = Environment({}, Environment(names, world.base, library=True), user=True)
         run.run(module.body, scope)
-        return _scenario(
-            run, module, chosen, network, _borrowed(module, scope, names, library) if model is None else ()
-        )
+        warnings = _borrowed(module, scope, names, library) if model is None else ()
+        if map_defaults and not network.features:
+            warnings += _anywhere(run.objects)
+        return _scenario(run, module, chosen, network, warnings)
     except RecursionError:
         raise fail("budget-exceeded", "the program is nested too deeply", _start(source), "",
                    ("make expressions and calls flatter",)) from None  # fmt: skip
@@ -127,6 +135,26 @@ def _borrowed(
             hints = (f"`{line}` says what is meant",)
             return (Diagnostic("unknown-model", message, node.span, hints=hints, severity="warning"),)
     return ()
+
+
+def _anywhere(objects: list[Instance]) -> tuple[Diagnostic, ...]:
+    """A note where classes would place or turn their objects as the map has it, and there is none."""
+    freed = [each for each in objects if _is_anywhere(each)]
+    if not freed:
+        return ()
+    named = listed(dict.fromkeys(each.cls.name for each in freed))
+    message = f"there is no map: {named} may be anywhere and head anywhere, where the program says nothing else"
+    return (Diagnostic("no-map", message, freed[0].span, severity="note"),)
+
+
+def _is_anywhere(instance: Instance) -> bool:
+    """Whether an object's place or direction is a default that stands for what the map lacks."""
+    for name in ("position", "heading"):
+        chain = (each.definitions.get(name) for each in instance.cls.ancestry())
+        definition = next((each for each in chain if each is not None), None)
+        if definition is not None and name not in instance.explicit and is_anywhere(definition.default):
+            return True
+    return False
 
 
 def _on_map(error: ScenarioError, network: Network) -> ScenarioError:

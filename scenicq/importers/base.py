@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
 from scenicq.errors import DataError, Diagnostic
-from scenicq.importers.fields import InvalidError, parse_json
+from scenicq.importers.fields import NO_MAP, InvalidError, parse_json
 from scenicq.importers.folders import read_bytes
 from scenicq.importers.report import Report
 from scenicq.store.classes import ROOT, is_class
@@ -235,6 +235,10 @@ class Labels:
         return Recording(name, map_name, tuple(sound))
 
     def _tell_missing(self, map_name: str, labels: int) -> None:
+        if map_name == NO_MAP:
+            message = "labels have no map: no road, lane or direction of traffic is known for them"
+            self._report.assumed("map", "no map", message, hints=("`--map none=FILE.geojson` gives one",))
+            return
         message = f"map `{map_name}` is not there; its labels are kept without a road network"
         hint = f"`--map {map_name}=FILE.geojson` gives the map"
         for _ in range(labels):

@@ -11,6 +11,7 @@ from scenicq.store.value_rules import LONGEST_NAME
 
 __all__ = [
     "LONGEST_TEXT",
+    "NO_MAP",
     "InvalidError",
     "check_characters",
     "integer",
@@ -29,6 +30,8 @@ __all__ = [
 ]
 
 Record = Mapping[str, Any]
+NO_MAP = "none"
+"""The map of labels that lie on none."""
 LONGEST_TEXT = LONGEST_NAME
 """Characters of a name."""
 _LARGEST = 2**63 - 1

@@ -34,7 +34,7 @@ from scenicq.importers.base import (
 )
 from scenicq.importers.cameras import camera_of
 from scenicq.importers.ego_choice import ego_facts, viewpoint
-from scenicq.importers.fields import InvalidError, Record
+from scenicq.importers.fields import NO_MAP, InvalidError, Record
 from scenicq.importers.folders import first_files, read_bytes, readable
 from scenicq.importers.grouped_lines import GroupedLines, group_lines
 from scenicq.importers.interchange_columns import read_columns
@@ -216,7 +216,7 @@ class _LabelReader:
                 frame=frame,
                 recording=recording,
                 timestamp_us=fields.integer(line, "timestamp_us"),
-                map=fields.text(line, "map"),
+                map=NO_MAP if line.get("map") is None else fields.text(line, "map"),
                 ego=ego,
                 objects=objects,
                 params=fields.scalars(line, "params", self._attribute(f"{place}: label `{frame}`")),

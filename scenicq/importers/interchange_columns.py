@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from scenicq.geometry.angles import normalize_array
 from scenicq.importers.cameras import camera_of
-from scenicq.importers.fields import InvalidError
+from scenicq.importers.fields import NO_MAP, InvalidError
 from scenicq.importers.sound_columns import UNUSUAL, are, column, demand, vectors
 from scenicq.store.columns import MemberColumns, RecordingColumns, to_json
 from scenicq.store.wkb import FARTHEST_M
@@ -52,7 +52,7 @@ def _columns(
 ) -> RecordingColumns:
     labels.sort(key=lambda label: (label["timestamp_us"], label["id"]))
     times = [label["timestamp_us"] for label in labels]
-    maps = {label["map"] for label in labels}
+    maps = {NO_MAP if label.get("map") is None else label["map"] for label in labels}
     demand(len(set(times)) == len(times) and len(maps) == 1)
     lists: list[list[Any]] = [label["objects"] for label in labels]
     sensors: list[dict[str, Any]] = [label.get("sensors") or {} for label in labels]
@@ -103,7 +103,8 @@ def _label(content: object, recording: str) -> dict[str, Any]:
         line.get("recording") == recording
         and type(time) is int
         and abs(time) <= _LARGEST
-        and all(type(line.get(key)) is str and line[key] != "" for key in ("id", "recording", "map"))
+        and all(type(line.get(key)) is str and line[key] != "" for key in ("id", "recording"))
+        and (line.get("map") is None or (type(line["map"]) is str and line["map"] != ""))
         and type(line.get("objects")) is list
         and type(line.get("ego")) is dict
         and isinstance(line.get("sensors"), dict | None)

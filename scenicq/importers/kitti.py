@@ -18,7 +18,7 @@ from scenicq.errors import DataError, Diagnostic
 from scenicq.geometry.angles import rotate
 from scenicq.importers.base import ClassNames, OpenedSource, Options, read_maps
 from scenicq.importers.by_file import RecordingFiles, by_file_source, missing
-from scenicq.importers.fields import InvalidError
+from scenicq.importers.fields import NO_MAP, InvalidError
 from scenicq.importers.layouts import kitti_files
 from scenicq.importers.motion import Rigid, euler, matrix, velocities
 from scenicq.importers.recording_checks import radians
@@ -29,7 +29,6 @@ from scenicq.store.labels import Label, LabelObject
 
 __all__ = ["Kitti"]
 
-_MAP = "none"
 _LABELS = "label_02"
 _STEP_US = 100_000
 _REACH_US, _LONGEST_STEP_US = 250_000, 550_000
@@ -76,7 +75,7 @@ class Kitti:
         return by_file_source(
             f"kitti-{path.resolve().name}",
             maps,
-            [_place(file, path, next(iter(maps), _MAP)) for file in files],
+            [_place(file, path, next(iter(maps), NO_MAP)) for file in files],
             {**taxonomy("kitti"), **options.class_map},
             _read_sequence,
             frames=0,

@@ -18,7 +18,7 @@ from scenicq.importers import fields
 from scenicq.importers.base import ClassNames, OpenedSource, Options, read_maps
 from scenicq.importers.by_file import RecordingFiles, by_file_source, missing
 from scenicq.importers.ego_choice import Moment, ego_facts, with_egos
-from scenicq.importers.fields import InvalidError, Record
+from scenicq.importers.fields import NO_MAP, InvalidError, Record
 from scenicq.importers.layouts import openlabel_files
 from scenicq.importers.openlabel_objects import FrameObjects, objects_of
 from scenicq.importers.openlabel_systems import Systems, first_vehicle
@@ -31,7 +31,6 @@ from scenicq.store.labels import Label, LabelObject
 
 __all__ = ["OpenLabel"]
 
-_MAP = "none"
 _STEP_US = 100_000
 _LARGEST_BYTES = 1 << 30
 _LARGEST_OF_ONE_FRAME = 16 << 20
@@ -58,7 +57,7 @@ class OpenLabel:
             raise missing(path, "no `*.json` of OpenLABEL")
         maps = read_maps(options.maps, report)
         choice = () if options.ego is None else (options.ego,)
-        map_name = next(iter(maps), _MAP)
+        map_name = next(iter(maps), NO_MAP)
         if len(files) > 1 and all(_has_one_frame(file) for file in files):
             places = [RecordingFiles(path.resolve().stem, tuple(files), path, map_name, choice)]
         else:

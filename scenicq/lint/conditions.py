@@ -32,6 +32,7 @@ from scenicq.forest.nodes import (
     VectorOf,
 )
 from scenicq.forest.scenario import Requirement, Scenario
+from scenicq.forest.value_numbers import ValueNumbers
 from scenicq.forest.walk import postorder, transform
 from scenicq.geometry import shapes
 from scenicq.geometry.membership import bounds as region_bounds
@@ -75,6 +76,7 @@ def lint_scenario(
             yield from _constant(requirement, box)
             if network is not None:
                 yield from _too_large(scenario, requirement)
+    yield from _exclusive(scenario)
     yield from _folded(scenario, options)
     yield from _headings(scenario)
     yield from _exact(scenario, options)
@@ -174,6 +176,57 @@ def _order(node: Compare) -> bool | None:
     if left[0] > right[1] or (strict and left[0] == right[1]):
         return False
     return None
+
+
+def _exclusive(scenario: Scenario) -> Iterator[Diagnostic]:
+    """Requirements that bound the same number so that nothing is left."""
+    numbers = ValueNumbers()
+    ends: dict[int, list[tuple[float, bool, Span | None]]] = {}
+    for requirement in scenario.requirements:
+        for compared, op, number in () if requirement.built_in is not None else _bounds(requirement.condition):
+            low, high = ends.setdefault(
+                numbers.expression(compared), [(-math.inf, False, None), (math.inf, False, None)]
+            )
+            strict = op in (CompareOp.LT, CompareOp.GT)
+            if op in (CompareOp.LT, CompareOp.LE):
+                high = min(high, (number, not strict, requirement.span), key=lambda end: end[:2])
+            else:
+                low = max(low, (number, strict, requirement.span), key=lambda end: end[:2])
+            if low[0] > high[0] or (low[0] == high[0] and (low[1] or not high[1])):
+                spans = sorted((each for each in (low[2], high[2]) if each is not None), key=lambda each: each.start)
+                if len(spans) == 2:
+                    line = spans[0].source.position(spans[0].start)[0]
+                    beside = "both sides of this requirement" if spans[0] == spans[1] else f"this and line {line}"
+                    yield _warning(
+                        "requirement-never", f"no scene satisfies {beside}", spans[1], "excludes everything",
+                    )  # fmt: skip
+                return
+            ends[numbers.expression(compared)] = [low, high]
+
+
+def _bounds(condition: Node) -> Iterator[tuple[Node, CompareOp, float]]:
+    """The numbers that a condition bounds by a number, whatever else it asks."""
+    stack = [condition]
+    while stack:
+        match stack.pop():
+            case Logic(op=LogicOp.AND, args=args):
+                stack += args
+            case Logic(op=LogicOp.NOT, args=(Compare(op, left, right),)) if op in _OPPOSITE:
+                stack.append(Compare(_OPPOSITE[op], left, right))
+            case Compare(op, compared, Constant(value=int() | float() as number)) if op in _MIRRORED:
+                yield compared, op, float(number)
+            case Compare(op, Constant(value=int() | float() as number), compared) if op in _MIRRORED:
+                yield compared, _MIRRORED[op], float(number)
+            case _:
+                pass
+
+
+_MIRRORED = {
+    CompareOp.LT: CompareOp.GT, CompareOp.LE: CompareOp.GE, CompareOp.GT: CompareOp.LT, CompareOp.GE: CompareOp.LE,
+}  # fmt: skip
+_OPPOSITE = {
+    CompareOp.LT: CompareOp.GE, CompareOp.LE: CompareOp.GT, CompareOp.GT: CompareOp.LE, CompareOp.GE: CompareOp.LT,
+}  # fmt: skip
 
 
 # --- boxes

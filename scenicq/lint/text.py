@@ -15,6 +15,8 @@ from scenicq.syntax.walk import children, walk
 
 __all__ = ["lint_text"]
 
+_FASTEST_MPS = 45.0
+"""What few vehicles on roads reach: the most that Scenic's own vehicles drive."""
 _FULL_TURN = math.tau * (1 + 1e-9)
 _ANGLE_PROPERTIES = frozenset({"heading", "yaw", "roadDeviation", "viewAngle", "parentOrientation"})
 _MEASURED = frozenset({"speed", "width", "length", "height", "x", "y", "acceleration", "angularSpeed"})
@@ -46,6 +48,11 @@ def lint_text(body: tuple[ast.Statement, ...], *, properties: bool) -> Iterator[
         yield from _angles(node)
         yield from _range(node)
         yield from _exact(node)
+        yield from _alone(node)
+        yield from _two(node)
+        yield from _fast(node)
+    yield from _signed(nodes)
+    yield from _egos(body)
     yield from _facing_objects(nodes)
     yield from _unused(nodes)
     if properties:
@@ -151,6 +158,115 @@ def _facing_objects(nodes: list[ast.SyntaxNode]) -> Iterator[Diagnostic]:
                 )  # fmt: skip
             case _:
                 pass
+
+
+def _order_of(chain: ast.ComparisonChain) -> Iterator[tuple[ast.SyntaxNode, ast.SyntaxNode]]:
+    """Which sides of a chain are to be below which others."""
+    sides = [chain.left, *(each.right for each in chain.comparisons)]
+    for (left, right), link in zip(itertools.pairwise(sides), chain.comparisons, strict=True):
+        if link.operator in ("<", "<="):
+            yield left, right
+        elif link.operator in (">", ">="):
+            yield right, left
+
+
+def _signed(nodes: list[ast.SyntaxNode]) -> Iterator[Diagnostic]:
+    """Angles that are bounded from above alone, by an amount: they may be as far to the right as they like."""
+    pairs = [(node, *each) for node in nodes if isinstance(node, ast.ComparisonChain) for each in _order_of(node)]
+    bounded_below = {_text(high) for _, _, high in pairs}
+    for node, angle, end in pairs:
+        most = _number(end)
+        if isinstance(angle, ast.Phrase) and _is_angle(angle) and most is not None and 0 < most < math.pi:
+            text = _text(angle)
+            if text not in bounded_below:
+                yield _warning(
+                    "angle-without-abs", f"`{text}` is negative to the right, so every angle to the right is below "
+                    f"{_text(end)}", node.span, "bounds one side alone",
+                    f"`abs({text}) < {_text(end)}` bounds both sides",
+                )  # fmt: skip
+
+
+def _text(node: ast.SyntaxNode) -> str:
+    return " ".join(node.span.text.split())
+
+
+# --- statements
+
+
+def _is_condition(node: ast.SyntaxNode) -> bool:
+    match node:
+        case ast.ComparisonChain():
+            return True
+        case ast.BoolOp():
+            return all(map(_is_condition, node.values))
+        case ast.UnaryOp(operator="not"):
+            return _is_condition(node.operand)
+        case _:
+            return False
+
+
+def _alone(node: ast.SyntaxNode) -> Iterator[Diagnostic]:
+    """Conditions that are a statement of their own."""
+    if isinstance(node, ast.ExpressionStatement) and _is_condition(node.value):
+        yield _warning(
+            "condition-alone", "this condition asks nothing: no `require` stands before it", node.span,
+            "is worked out and forgotten", f"write `require {_text(node)}`",
+        )  # fmt: skip
+
+
+def _egos(body: tuple[ast.Statement, ...]) -> Iterator[Diagnostic]:
+    """A second object that is called `ego`: the first one is there, too."""
+    made = [
+        each for each in body
+        if isinstance(each, ast.Assign) and isinstance(each.value, ast.New)
+        and any(isinstance(target, ast.Name) and target.id == "ego" for target in each.targets)
+    ]  # fmt: skip
+    for each in made[1:]:
+        line = made[0].span.source.position(made[0].span.start)[0]
+        yield _warning(
+            "ego-twice", f"the ego of line {line} is an object of the scene, too", each.span, "is the ego from here on",
+            "give one of the two another name",
+        )  # fmt: skip
+
+
+def _two(node: ast.SyntaxNode) -> Iterator[Diagnostic]:
+    """`Uniform` of two numbers on both sides of 0: a range through 0 may be meant."""
+    match node:
+        case ast.Call(function=ast.Name(id="Uniform"), arguments=(first, second)):
+            low, high = (_number(each.value) for each in (first, second))
+            if low is not None and high is not None and low < 0 < high and (low, high) != (-1, 1):
+                if any(ast.is_phrase(each.value, phrases.DEG) for each in (first, second)):
+                    return
+                one, other = (each.value.span.text for each in (first, second))
+                yield _warning(
+                    "choice-of-two", f"this is {one} or {other}, and nothing between", node.span, "one of two numbers",
+                    f"`Range({one}, {other})` is all between them",
+                )  # fmt: skip
+        case _:
+            pass
+
+
+def _fast(node: ast.SyntaxNode) -> Iterator[Diagnostic]:
+    """Speeds above what roads see."""
+    places: list[ast.SyntaxNode] = []
+    match node:
+        case ast.WithSpecifier(property="speed"):
+            places = [node.value]
+        case ast.ComparisonChain():
+            sides = [node.left, *(each.right for each in node.comparisons if each.operator in _ORDERS)]
+            if any(isinstance(side, ast.Attribute) and side.name == "speed" for side in sides):
+                places = sides
+        case _:
+            pass
+    for place in places:
+        for term in _terms(place):
+            value = _number(term)
+            if value is not None and value > _FASTEST_MPS:
+                text = term.span.text
+                yield _warning(
+                    "speed-beyond-roads", f"{text} m/s are {value * 3.6:.0f} km/h", term.span, "speeds are in m/s",
+                    f"write `{text} / 3.6` for km/h",
+                )  # fmt: skip
 
 
 # --- numbers that labels measure

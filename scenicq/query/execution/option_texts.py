@@ -52,6 +52,7 @@ class OptionTexts(TypedDict, total=False):
     strict: bool
     scenic: str | None
     initial: bool
+    map_defaults: bool
     ignore_params: str | None
     behaviors: Behaviors | None
     min_duration: float | str | None
@@ -81,6 +82,7 @@ KINDS: Mapping[str, OptionKind] = {
     "strict": Flag(),
     "scenic": OneOf(tuple(VERSIONS)),
     "initial": Flag(),
+    "map_defaults": Flag(),
     "ignore_params": Text("names of parameters, separated by commas"),
     "behaviors": OneOf(("refuse", "ignore")),
     "min_duration": Amount("s"),
@@ -159,7 +161,9 @@ def read_options(**given: Unpack[OptionTexts]) -> QueryOptions:
         ignore_params=_DEFAULTS.ignore_params.union(_names(read.get("ignore_params"))),
     )
     time = IntervalOptions(read.get("intervals", "longest"), read.get("min_duration"), read.get("gap", DEFAULT_GAP_S))
-    same = ("solver", "initial", "prefilter", "jobs", "limit", "every", "all_matches", "strict", "model")
+    same = (
+        "solver", "initial", "map_defaults", "prefilter", "jobs", "limit", "every", "all_matches", "strict", "model",
+    )  # fmt: skip
     values: dict[str, Any] = {name: value for name, value in read.items() if name in same}
     version = None if scenic is None else VERSIONS[scenic]
     behaviors: Behaviors = read.get("behaviors") or "refuse"

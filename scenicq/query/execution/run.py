@@ -59,6 +59,7 @@ class QueryOptions:
         solver: Which solver, as `scenicq.smt.solver.open_solver` takes it.
         version: The version of Scenic; inferred if None.
         initial: Whether dynamic parts of the program are ignored.
+        map_defaults: Whether the world model's classes place and turn their objects as the map has it.
         prefilter: Whether SQL narrows the frames first; the results are the same.
         jobs: Processes that match; None for as many as pays.
         limit: Matches after which to stop; None for all.
@@ -80,6 +81,7 @@ class QueryOptions:
     solver: str = "auto"
     version: Literal[1, 2, 3] | None = None
     initial: bool = False
+    map_defaults: bool = True
     prefilter: bool = True
     jobs: int | None = 1
     limit: int | None = None
@@ -158,7 +160,7 @@ class Query:
             scenario = compile_scenario(
                 self.source, network, version=self.options.version, initial=self.options.initial,
                 behaviors=self.options.behaviors, loader=self.siblings,
-                model=self.options.model,
+                model=self.options.model, map_defaults=self.options.map_defaults,
             )  # fmt: skip
             check_enforced(scenario, self.options.match.enforce)
         except ScenarioError as error:
@@ -233,6 +235,11 @@ class Query:
             self.funnel.missing.update(compared.missing)
             if remark := map_remark(self.source, self.options.version, self.dataset):
                 self.funnel.warnings.append(remark)
+
+    def notes(self, maps: Iterable[str] | None = None) -> list[Diagnostic]:
+        """How the program is read where that hangs on the dataset, each thing once; arguments as of `fitting`."""
+        said = (each for compiled in self.fitting(maps) for each in compiled.scenario.warnings)
+        return [*{each.code: each for each in said if each.severity == "note"}.values()]
 
     def fitting(self, maps: Iterable[str] | None = None) -> Iterator[CompiledMap]:
         """The scenario over each map that it fits.
