@@ -42,7 +42,7 @@ from scenicq.match.fields import branch_and_prune, field_solver  # noqa: E402
 from scenicq.match.linear.affine_reach import Reach  # noqa: E402
 from scenicq.match.matcher import Matcher  # noqa: E402
 from scenicq.match.options import MatchOptions  # noqa: E402
-from scenicq.match.problem.outcome import Undecided  # noqa: E402
+from scenicq.match.problem.outcome import Undecided, finished  # noqa: E402
 from scenicq.match.search import backtracking, group_cache, group_plan, label_search  # noqa: E402
 from scenicq.match.search.first_fit import FirstFit  # noqa: E402
 from scenicq.match.tolerance import Tolerance  # noqa: E402
@@ -113,13 +113,24 @@ def _undecided(parts: Sequence[Sequence[Any]], *_: object) -> Undecided:
     return Undecided(parts[0][0][0], "switched off")
 
 
+def _at_once(decide: Callable[..., Any]) -> Callable[..., Iterator[Any]]:
+    """What decides in one step as something that may take several."""
+
+    def steps(*given: Any) -> Iterator[Any]:
+        yield from ()
+        return decide(*given)
+
+    return steps
+
+
 def _back_by_one(frames: Sequence[Any], failed: Any, *rest: Any) -> None:
     failed.blamed.update(frame.slot.name for frame in frames[-1:])
     _JUMP(frames, failed, *rest)
 
 
 def _anew(self: Any, plan: Any, assignment: Mapping[int, int]) -> tuple[Any, Any]:
-    return plan.group, self._in_closed_form(plan, assignment) or self._by_cascade(plan.group, assignment)
+    with self.trials:
+        return plan.group, finished(self._steps(plan, assignment))
 
 
 _JUMP = backtracking._jump
@@ -134,14 +145,16 @@ STEPS: dict[str, Off] = {
     "arc consistency": _set(label_search, "arc_consistent", lambda plan, candidates, *_: (candidates, None)),
     "subgroups": _set(group_plan, "subgroups_of", lambda *_: ()),
     "affine inversion": _set(cascade._Cascade, "_invert", lambda self, item: Reach(None, {})),
-    "decomposition": _set(group_cache, "decide_decomposed", cascade.decide),
-    "choice search": _set(group_cache, "decide_with_choices", lambda *_: None),
+    "decomposition": _set(
+        group_cache, "search_decomposed", _at_once(lambda items, tolerance, *_: cascade.decide(items, tolerance))
+    ),
+    "choice search": _set(group_cache, "search_choices", _at_once(lambda *_: None)),
     "areas of hidden distances": _set(decomposition, "with_areas", lambda *_, **__: None),
     "branch and prune": _set(
         branch_and_prune, "branch_and_prune", lambda items, _: Undecided(items[0][0], "switched off")
     ),
     "trial": _set(field_solver, "find_witness", lambda *_, **__: None),
-    "heading propagation": _set(field_solver, "decide_directions", _undecided),
+    "heading propagation": _set(field_solver, "search_directions", _at_once(_undecided)),
     "parts by a shared number": _set(decomposition, "_shared", lambda *_: None),
 }
 

@@ -17,6 +17,7 @@ from scenicq.match.decide import solver_step
 from scenicq.match.linear import linear_program
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
+from scenicq.match.problem import conditioned
 from scenicq.match.problem.outcome import Undecided
 from scenicq.match.search import group_cache, group_plan
 from scenicq.match.tolerance import EXACT, Tolerance
@@ -267,17 +268,15 @@ def test_an_unknown_correspondence_does_not_hide_one_that_matches():
     scenario = compiled(HEADER + text)
     label = frame(car("a", 2.0, 57.0), car("b", 1.5, 58.0))
 
-    def decide(items, tolerance, patience):
-        return (
-            Undecided(items[0][0], "nonlinear")
-            if (2.0, 57.0) in [item[2] for item in items]
-            else real(items, tolerance, patience)
-        )
+    def search(items, *rest):
+        if (2.0, 57.0) in [item[2] for item in items]:
+            return Undecided(items[0][0], "nonlinear")
+        return (yield from real(items, *rest))
 
-    real = group_cache.decide_decomposed
+    real = group_cache.search_decomposed
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(group_plan, "closed_form_of", lambda *_: None)
-        patch.setattr(group_cache, "decide_decomposed", decide)
+        patch.setattr(group_cache, "search_decomposed", search)
         assert (
             Matcher(scenario, MatchOptions(tolerance=EXACT), Fixed(NoAnswer("timeout")))
             .match(label)
@@ -298,7 +297,7 @@ def test_what_geometry_cannot_tell_is_unknown(monkeypatch):
     def fails(*_):
         raise CannotEvaluate("whether moons meet")
 
-    monkeypatch.setattr(group_cache, "condition_group", fails)
+    monkeypatch.setattr(conditioned, "condition_group", fails)
     for method in ("auto", "smt", "monolithic"):
         found = verdict(NONLINEAR, frame(THERE), Fixed(Unsat()), method=method)
         assert isinstance(found, Unknown)

@@ -8,28 +8,48 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import chain
+from typing import TYPE_CHECKING
 
 from scenicq.forest.components import connected_components
-from scenicq.forest.nodes import Constant, Identity, Leaf, Range, TruncatedNormal, Value
+from scenicq.forest.nodes import Constant, Identity, Index, Leaf, Range, TruncatedNormal, Value
 from scenicq.forest.walk import leaves
 from scenicq.match.decide.cascade import decide
 from scenicq.match.decide.hidden_distances import with_areas
 from scenicq.match.linear.affine_reach import ends
-from scenicq.match.problem.conditioned import Item, item_conjuncts, uses_field
+from scenicq.match.problem.conditioned import Item, item_conjuncts, uses_far_field, uses_field
 from scenicq.match.problem.evaluation import ground_cause, holds, replay
-from scenicq.match.problem.outcome import Outcome, Patience, Refuted, Satisfied, Undecided
+from scenicq.match.problem.outcome import (
+    Outcome,
+    Refuted,
+    Satisfied,
+    Steps,
+    Undecided,
+    finished,
+    finished_together,
+)
 from scenicq.match.tolerance import SLACK, Tolerance
 
-__all__ = ["decide_decomposed"]
+if TYPE_CHECKING:  # takes long to load
+    from scenicq.match.fields.heading_propagation import KnownCases
+
+__all__ = ["chooses_apart", "decide_decomposed", "search_decomposed"]
+
+_FEW_OPTIONS = 8
+"""Options of a choice up to which a part is looked at for all of them."""
 
 
-def decide_decomposed(items: list[Item], tolerance: Tolerance, patience: Patience = Patience.ALL) -> Outcome:
+def decide_decomposed(items: list[Item], tolerance: Tolerance) -> Outcome:
+    """What `search_decomposed` finds, whatever it takes."""
+    return finished(search_decomposed(items, tolerance))
+
+
+def search_decomposed(items: list[Item], tolerance: Tolerance, known: KnownCases | None = None) -> Steps:
     """Decide a group without a solver, part by part where it has parts; `Undecided` where a solver is needed.
 
     Args:
         items: The group's constraints, conditioned.
         tolerance: Per feature.
-        patience: What may take long; the rest is postponed.
+        known: As of `search_directions`.
     """
     left: list[Item] = []
     for item in chain.from_iterable(map(item_conjuncts, items)):
@@ -40,30 +60,42 @@ def decide_decomposed(items: list[Item], tolerance: Tolerance, patience: Patienc
     used = {id(item): {leaf.identity: leaf for leaf in leaves(item[1])} for item in left}
     alone = _components(left, used, None)
     if len(alone) > 1:
-        return _all(alone, items, tolerance, patience)
+        return (yield from _all(alone, items, tolerance, known))
     outlined = with_areas(left, tolerance)
     if outlined is not None:
-        found = decide_decomposed(outlined, tolerance, patience)
+        found = yield from search_decomposed(outlined, tolerance, known)
         if not isinstance(found, Satisfied) or replay(items, found.values, tolerance, SLACK):
             return found
-        found = decide_decomposed(with_areas(left, tolerance, outer=False) or [], tolerance, patience)
+        found = yield from search_decomposed(with_areas(left, tolerance, outer=False) or [], tolerance, known)
         sure = isinstance(found, Satisfied) and replay(items, found.values, tolerance, SLACK)
         return found if sure else Undecided(items[0][0], "nonlinear")
     if uses_field(left):
-        from scenicq.match.fields.field_solver import decide_directions  # noqa: PLC0415 - takes long to load
+        from scenicq.match.fields.field_solver import search_directions  # noqa: PLC0415 - takes long to load
 
         shared = _shared(left, used)
         parts, number = ([left], None) if shared is None else (shared[2], shared[0].identity)
-        return decide_directions(parts, number, tolerance, patience)
+        return (yield from search_directions(parts, number, tolerance, known))
     return decide(left, tolerance)
 
 
-def _all(parts: Sequence[list[Item]], items: list[Item], tolerance: Tolerance, patience: Patience) -> Outcome:
+def chooses_apart(items: Sequence[Item]) -> bool:
+    """Whether fields are asked at hidden places in parts that share one number alone, each with few choices if any.
+
+    There are as many combinations of outcomes as their numbers multiplied, but what each part comes to for its own ones
+    is looked at once.
+    """
+    left = [part for item in items for part in item_conjuncts(item) if not isinstance(part[1], Constant)]
+    used = {id(item): {leaf.identity: leaf for leaf in leaves(item[1])} for item in left}
+    counts = [len(leaf.weights) for each in used.values() for leaf in each.values() if isinstance(leaf, Index)]
+    few = bool(counts) and max(counts) <= _FEW_OPTIONS
+    return few and uses_far_field(left) and _shared(left, used) is not None
+
+
+def _all(parts: Sequence[list[Item]], items: list[Item], tolerance: Tolerance, known: KnownCases | None) -> Steps:
     """Parts that have no random variable in common."""
     values: dict[Identity, Value] = {}
     doubt: Undecided | None = None
-    for part in parts:
-        outcome = decide_decomposed(part, tolerance, patience)
+    for outcome in (yield from finished_together([search_decomposed(part, tolerance, known) for part in parts])):
         if isinstance(outcome, Refuted):
             return outcome
         if isinstance(outcome, Undecided):

@@ -7,7 +7,6 @@ these the directions are known, so that the rest is a linear program with one ma
 
 from __future__ import annotations
 
-import math
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 
@@ -22,35 +21,33 @@ from scenicq.limits import LIMITS
 from scenicq.match.fields.cell_assignment import HeadingAssignment, assignment_of, solved
 from scenicq.match.fields.constraint_network import ConstraintNetwork
 from scenicq.match.fields.contractor import BoxSet
-from scenicq.match.fields.heading_propagation import bisected, directed, propagated
+from scenicq.match.fields.heading_propagation import DirectedCases, KnownCases, bisected, directed, propagated
 from scenicq.match.fields.shared_variable import find_shared_value, joined
 from scenicq.match.fields.witness_search import THOROUGH, find_witness
 from scenicq.match.problem.conditioned import Item, conditioned
-from scenicq.match.problem.outcome import POSTPONED, Outcome, Patience, Refuted, Satisfied, Undecided
+from scenicq.match.problem.outcome import Outcome, Patience, Refuted, Satisfied, Steps, Undecided, finished
 from scenicq.match.tolerance import Tolerance
 
-__all__ = ["decide_directions", "repaired"]
+__all__ = ["repaired", "search_directions"]
 
 _MANY_CASES = 128
 """Cases of one part after which more draws look for a witness than before, and again after four times so many."""
-_SEARCHES = {Patience.LITTLE: 0, Patience.LIKELY: 1, Patience.ALL: math.inf}
-"""How often that is, until the rest is postponed."""
 _TRIALS = 400.0
 """Trials of each of these searches, a share of which it may take."""
 _CLOSE = 0.05
 """How far from the answer of a solver a solution is looked for."""
 
 
-def decide_directions(
-    parts: Sequence[list[Item]], shared: Identity | None, tolerance: Tolerance, patience: Patience = Patience.ALL
-) -> Outcome:
+def search_directions(
+    parts: Sequence[list[Item]], shared: Identity | None, tolerance: Tolerance, known: KnownCases | None = None
+) -> Steps:
     """Decide a group with fields at hidden points, without a solver; `Undecided` where one is needed.
 
     Args:
         parts: The constraints, conditioned, in parts that share no random variable but one.
         shared: The random number that all of them share, if there are several parts.
         tolerance: Per feature.
-        patience: What may take long; what takes more cases is postponed.
+        known: Cases that were looked for already, extended: several groups of a label have the same parts.
     """
     first = parts[0][0][0]
     start = BoxSet.start(ConstraintNetwork([item for part in parts for item in part], tolerance), {}).narrowed()
@@ -60,38 +57,47 @@ def decide_directions(
     if witness is not None:
         return witness
     if shared is None or len(parts) == 1:
-        return _alone(start, first, tolerance, patience)
-    networks = [ConstraintNetwork(part, tolerance) for part in parts]
+        return (yield from _alone(start, first, tolerance))
     chosen: list[list[BoxSet]] = []
     limits: list[FloatInterval] = []
     try:
-        for network in networks:
-            known = {shared: limits} if limits else {}
+        for part in parts:
             left: list[BoxSet] = []
-            for cases in directed(BoxSet.start(network, known), _MANY_CASES):
+            for cases in _directed(part, tolerance, shared, limits, {} if known is None else known):
                 if cases.size:
                     left.append(cases)
-                elif patience is Patience.LITTLE:
-                    return Undecided(first, POSTPONED)
+                else:
+                    yield Patience.LIKELY
             if not left:
-                return Refuted(network.items[0][0])
+                return Refuted(part[0][0])
             chosen.append(left)
             limits = _joined(left, shared)
         # what a later part excludes of the shared number excludes ways of the earlier ones
         chosen = [_within(found, shared, limits) for found in chosen]
     except Exhausted as error:
-        return (
-            Undecided(first, POSTPONED) if patience < Patience.ALL else _searched(start) or Undecided.by(first, error)
-        )
+        doubt = Undecided.by(first, error)
+        yield Patience.ALL
+        return _searched(start) or doubt
     ways = [_ways(found, shared) for found in chosen]
     if not all(ways):
         return Refuted(first)
     found = find_shared_value(ways, shared, tolerance, lambda way: _divided(way, shared))
-    choices = [id(node) for network in networks for node in network.choices]
+    choices = [id(node) for left in chosen for node in left[0].network.choices]
     if isinstance(found, Undecided) and len(set(choices)) < len(choices):
         # fields that several parts ask for at one point have one direction there
-        return _alone(start, first, tolerance, patience)
+        return (yield from _alone(start, first, tolerance))
     return found
+
+
+def _directed(
+    part: list[Item], tolerance: Tolerance, shared: Identity, limits: list[FloatInterval], known: KnownCases
+) -> DirectedCases:
+    """The cases of a part in which the number that parts share is within limits."""
+    key = (*[(id(constraint), id(node), id(seen)) for constraint, node, seen in part], shared, *limits)
+    if key not in known:
+        start = BoxSet.start(ConstraintNetwork(part, tolerance), {shared: limits} if limits else {})
+        known[key] = DirectedCases(start, _MANY_CASES)
+    return known[key]
 
 
 def _one_by_one(found: Iterator[BoxSet]) -> Iterator[HeadingAssignment | None]:
@@ -103,15 +109,14 @@ def _one_by_one(found: Iterator[BoxSet]) -> Iterator[HeadingAssignment | None]:
         yield from (way for way in ways if way is not None)
 
 
-def _alone(start: BoxSet, first: Constraint, tolerance: Tolerance, patience: Patience = Patience.ALL) -> Outcome:
+def _alone(start: BoxSet, first: Constraint, tolerance: Tolerance) -> Steps:
     """What comes of the ways of one part; those that are vague are divided until a solution holds or none is left."""
     todo: deque[HeadingAssignment] = deque()
     doubt, searched = Undecided(first, "nonlinear"), 0
     try:
         for number, way in enumerate(_one_by_one(directed(start, _MANY_CASES))):
             if way is None:
-                if searched >= _SEARCHES[patience]:
-                    return Undecided(first, POSTPONED)
+                yield Patience.ALL if searched else Patience.LIKELY
                 found = _searched(start, searched)
                 searched += 1
             else:
@@ -128,8 +133,7 @@ def _alone(start: BoxSet, first: Constraint, tolerance: Tolerance, patience: Pat
                 return found
     except Exhausted as error:
         doubt = Undecided.by(first, error)
-    if patience < Patience.ALL:
-        return Undecided(first, POSTPONED)
+    yield Patience.ALL
     return doubt if searched else _searched(start) or doubt
 
 
@@ -182,7 +186,7 @@ def repaired(items: Sequence[Item], near: Mapping[Identity, Value], tolerance: T
     if len(given) < len(set(discrete)):
         return None
     network = ConstraintNetwork(conditioned(items, given), tolerance)
-    found = _alone(BoxSet.around(network, near, _CLOSE), items[0][0], tolerance)
+    found = finished(_alone(BoxSet.around(network, near, _CLOSE), items[0][0], tolerance))
     return Satisfied({**given, **found.values}) if isinstance(found, Satisfied) else None
 
 

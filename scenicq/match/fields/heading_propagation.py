@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import cast
+from typing import TypeAlias, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from scenicq.budget import Exhausted
 from scenicq.forest.nodes import Constant, DirectionAt, Identity, Index, Leaf, Node, PointIn
 from scenicq.forest.walk import leaves
 from scenicq.geometry import shapes
@@ -24,7 +25,7 @@ from scenicq.limits import LIMITS, exhausted
 from scenicq.match.fields.cell_assignment import MARGIN, SAME
 from scenicq.match.fields.contractor import BoxSet
 
-__all__ = ["bisected", "branch", "directed", "propagated"]
+__all__ = ["DirectedCases", "KnownCases", "bisected", "branch", "directed", "propagated"]
 
 _AT_ONCE = 256
 """Cases that are narrowed together: what one of them finds may make the others needless."""
@@ -67,6 +68,46 @@ def directed(start: BoxSet, soon: float = math.inf) -> Iterator[BoxSet]:
             yield cases
         else:
             todo += parts
+
+
+class DirectedCases:
+    """What `directed` finds, looked for once, whoever goes through it and however often."""
+
+    def __init__(self, start: BoxSet, soon: float) -> None:
+        """Take what `directed` takes."""
+        self._more = directed(start, soon)
+        self._found: list[BoxSet] = []
+        self._error: Exhausted | None = None
+
+    def __iter__(self) -> Iterator[BoxSet]:
+        """The cases; an empty set where those to come take long.
+
+        Raises:
+            Exhausted: There are too many cases.
+        """
+        number = 0
+        while True:
+            if number < len(self._found):
+                number += 1
+                yield self._found[number - 1]
+                continue
+            if self._error is not None:
+                raise self._error
+            try:
+                cases = next(self._more)
+            except StopIteration:
+                return
+            except Exhausted as error:
+                self._error = error
+                raise
+            if cases.size:
+                self._found.append(cases)
+            else:
+                yield cases
+
+
+KnownCases: TypeAlias = dict[tuple[object, ...], DirectedCases]
+"""Cases that were looked for already, by what they are cases of."""
 
 
 def propagated(cases: BoxSet) -> BoxSet:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import cast
 
 from scenicq.forest import build
 from scenicq.forest.condition import Observation, condition
-from scenicq.forest.groups import Comparison, Condition, Constraint, Group
+from scenicq.forest.groups import PARAMS, Comparison, Condition, Constraint, Group
 from scenicq.forest.kinds import kind_of
 from scenicq.forest.nodes import (
     Compare,
@@ -32,6 +33,7 @@ from scenicq.forest.walk import children, postorder
 
 __all__ = [
     "Item",
+    "LabelNodes",
     "condition_group",
     "conditioned",
     "fact",
@@ -57,12 +59,34 @@ def uses_far_field(items: Sequence[Item]) -> bool:
     return any(not isinstance(node.point, Constant) and id(node.point) not in seen for node in fields)
 
 
-def condition_group(group: Group, observed: Observation, scope: Mapping[Identity, Value] | None = None) -> list[Item]:
-    """A group's constraints given the label (algorithm 1, line 11); what they share stays shared."""
+@dataclass(eq=False, slots=True)
+class LabelNodes:
+    """What conditioning made of nodes for one label, by the label objects that they read: in all groups the same."""
+
+    _made: dict[tuple[Node, tuple[int, ...]], Node] = field(default_factory=dict["tuple[Node, tuple[int, ...]]", Node])
+
+    def items(self, group: Group, observed: Observation, assignment: Mapping[int, int]) -> list[Item]:
+        """A group's constraints, see `condition_group`, for the label objects in its roles."""
+        keys = [(node, tuple([assignment[index] for index in roles])) for node, roles in _readers(group)]
+        memo = {id(key[0]): self._made[key] for key in keys if key in self._made}
+        items = condition_group(group, observed, memo)
+        self._made.update((key, memo[id(key[0])]) for key in keys if id(key[0]) in memo)
+        return items
+
+
+def condition_group(group: Group, observed: Observation, made: dict[int, Node] | None = None) -> list[Item]:
+    """A group's constraints given the label (algorithm 1, line 11); what they share stays shared.
+
+    Args:
+        group: The group.
+        observed: What the label observes of the objects.
+        made: What was made of nodes before, by their ids; extended.
+    """
     items: list[Item] = []
-    memo = {} if scope else dict(_unobserved(group))
+    memo: dict[int, Node] = {} if made is None else made
+    memo |= _unobserved(group)
     for constraint in group.constraints:
-        node = condition(constraint.expression, observed, scope, memo)
+        node = condition(constraint.expression, observed, None, memo)
         known: Value = None
         if isinstance(constraint, Comparison):
             known = observed[(constraint.object, constraint.property)]
@@ -84,6 +108,20 @@ def _unobserved(group: Group) -> Mapping[int, Node]:
     largest.update((id(root), root) for root in roots if id(root) not in observing)
     memo: dict[int, Node] = {}
     return {key: condition(node, {}, None, memo) for key, node in largest.items()}
+
+
+@lru_cache(maxsize=256)
+def _readers(group: Group) -> tuple[tuple[Node, tuple[int, ...]], ...]:
+    """Nodes with the objects that they read, ascending; of groups without fields, which are decided at once, none."""
+    nodes = list(postorder([constraint.expression for constraint in group.constraints]))
+    changed = any(id(made) != key for key, made in _unobserved(group).items())
+    if changed or not any(isinstance(node, DirectionAt) for node in nodes):
+        return ()
+    read: dict[int, frozenset[int]] = {}
+    for node in nodes:
+        own = {node.object} - {PARAMS} if isinstance(node, Feature) else ()
+        read[id(node)] = frozenset(own).union(*[read[id(child)] for child in children(node)])
+    return tuple((node, tuple(sorted(read[id(node)]))) for node in nodes if read[id(node)])
 
 
 def conditioned(

@@ -2,23 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import TypeAlias
 
 from scenicq.budget import Exhausted
 from scenicq.forest.groups import Constraint
 from scenicq.forest.nodes import Identity, Value
 
-__all__ = ["POSTPONED", "UNOBSERVED", "Outcome", "Patience", "Refuted", "Satisfied", "Undecided"]
+__all__ = [
+    "UNOBSERVED",
+    "Outcome",
+    "Patience",
+    "Refuted",
+    "Satisfied",
+    "Search",
+    "Steps",
+    "Undecided",
+    "finished",
+    "finished_together",
+]
 
 
 UNOBSERVED = "unobserved"
 """Why a group is undecided that reads what the label does not tell."""
-
-
-POSTPONED = "postponed"
-"""Why a group is undecided that takes long, as long as other groups or correspondences may make that needless."""
 
 
 class Patience(IntEnum):
@@ -77,3 +85,68 @@ class Undecided:
 
 
 Outcome = Satisfied | Refuted | Undecided
+"""What is found of a question."""
+
+Steps: TypeAlias = Generator[Patience, None, Outcome]
+"""Decides a question step by step; before a step that takes long it says how much patience that takes."""
+
+
+class Search:
+    """A question that is decided as far as patience goes, and from there on once there is more."""
+
+    def __init__(self, steps: Steps) -> None:
+        """Take the steps, of which none was made."""
+        self._steps = steps
+        self._takes = Patience.LITTLE
+        self._outcome: Outcome | None = None
+        self._error: Exception | None = None
+
+    @property
+    def is_finished(self) -> bool:
+        """Whether it is decided."""
+        return self._outcome is not None
+
+    def within(self, patience: Patience) -> Outcome | None:
+        """The outcome; None where it takes more patience.
+
+        Raises:
+            Exhausted: The time is up.
+        """
+        while self._outcome is None and self._takes <= patience:
+            if self._error is not None:
+                raise self._error
+            try:
+                self._takes = next(self._steps)
+            except StopIteration as end:
+                self._outcome = end.value
+            except Exception as error:
+                self._error = error
+                raise
+        return self._outcome
+
+
+def finished(steps: Steps) -> Outcome:
+    """The outcome, whatever it takes.
+
+    Raises:
+        Exhausted: The time is up.
+    """
+    outcome = Search(steps).within(Patience.ALL)
+    assert outcome is not None
+    return outcome
+
+
+def finished_together(all_steps: Sequence[Steps]) -> Generator[Patience, None, list[Outcome]]:
+    """The outcomes of questions that all have to be satisfied; of the one that is refuted alone if one is."""
+    searches = [Search(steps) for steps in all_steps]
+    for patience in Patience:
+        outcomes: list[Outcome] = []
+        for search in searches:
+            outcome = search.within(patience)
+            if isinstance(outcome, Refuted):
+                return [outcome]
+            outcomes += [] if outcome is None else [outcome]
+        if len(outcomes) == len(searches):
+            return outcomes
+        yield Patience(patience + 1)
+    raise AssertionError("no step takes more than all patience")

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -30,44 +30,41 @@ from scenicq.limits import LIMITS, exhausted
 from scenicq.match.problem.bipartite_matching import Slot
 from scenicq.match.problem.conditioned import Item, conditioned, fact, item_conjuncts, uses_far_field
 from scenicq.match.problem.evaluation import ground_cause, holds
-from scenicq.match.problem.outcome import POSTPONED, Outcome, Patience, Refuted, Satisfied, Undecided
+from scenicq.match.problem.outcome import Outcome, Patience, Refuted, Satisfied, Search, Steps, Undecided
 from scenicq.match.search.backtracking import Consistency, find_assignments
 from scenicq.match.search.choice_problem import ChoiceProblem, ConstraintChoices
 from scenicq.match.search.outcome_bounds import possible_outcomes
 from scenicq.match.tolerance import Tolerance
 
-__all__ = ["Ask", "decide_with_choices"]
+__all__ = ["Ask", "AtLast", "search_choices"]
 
 
 _SEVERAL = 8
 """Combinations of outcomes from which on a witness is looked for over all of them, even if each may be cheap."""
 
-Decide = Callable[[list[Item]], Outcome]
+Decide = Callable[[list[Item]], Steps]
 """Decides constraints that hold no choices."""
+
+
+AtLast = Callable[[Sequence[Sequence[Item]]], Steps]
+"""Decides them where nothing else does."""
 
 
 Ask = Callable[[Sequence[Sequence[Item]]], Outcome]
 """Asks a solver about constraints that hold no choices."""
 
 
-def decide_with_choices(
-    items: Sequence[Item],
-    tolerance: Tolerance,
-    decide: Decide,
-    ask: Ask | None = None,
-    depth: int = 0,
-    *,
-    patience: Patience = Patience.ALL,
-) -> Outcome | None:
+def search_choices(
+    items: Sequence[Item], tolerance: Tolerance, decide: Decide, at_last: AtLast | None = None, depth: int = 0
+) -> Generator[Patience, None, Outcome | None]:
     """Decide a group that random choices are part of; None if there are none.
 
     Args:
         items: The group's constraints, conditioned.
         tolerance: Per feature.
         decide: Decides what is left when all choices have come out.
-        ask: The same by a solver, where nothing else decides it.
+        at_last: Decides it where that does not.
         depth: In how many other searches it is asked for.
-        patience: What may take long; the rest is postponed.
 
     Raises:
         Exhausted: The time is up.
@@ -87,7 +84,7 @@ def decide_with_choices(
     for constraint, node, seen in parts:
         if isinstance(node, Constant) and not holds(constraint, node.value, seen, tolerance):
             return Refuted(constraint, ground_cause((constraint, node, seen)))
-    return _ChoiceSearch(list(items), found, tolerance, decide, ask, depth, patience=patience).solve()
+    return (yield from _ChoiceSearch(list(items), found, tolerance, decide, at_last, depth).steps())
 
 
 class _ChoiceSearch:
@@ -99,50 +96,53 @@ class _ChoiceSearch:
         parts: list[ConstraintChoices],
         tolerance: Tolerance,
         decide: Decide,
-        ask: Ask | None,
+        at_last: AtLast | None,
         depth: int,
-        *,
-        patience: Patience,
     ) -> None:
-        self.patience = patience
+        self.patience = Patience.LITTLE
         self.items = items
         self.constraints = [constraint for constraint, _, _ in items]
         self.parts = parts
         self.tolerance = tolerance
         self.decide = decide
-        self.ask = ask
+        self.at_last = at_last
         self.depth = depth
         self.blamed: tuple[int, Refuted] | None = None
         self.doubt: Undecided | None = None
-        self.known: dict[tuple[int, tuple[tuple[int, int], ...]], Outcome] = {}
+        self.is_postponed = False
+        self.known: dict[tuple[int, tuple[tuple[int, int], ...]], Search] = {}
         problem = ChoiceProblem(parts)
         self.domains = problem.domains
         self.slot_of = problem.slot_of
         self.columns = problem.columns
         self.components = problem.components
 
-    def solve(self) -> Outcome:
+    def steps(self) -> Steps:
         """Decide the group."""
         excluded = self._narrow()
         if excluded is not None:
             return excluded
-        found = self._search_witness()
-        if found is not None:
-            return found
-        values: dict[Identity, Value] = {}
+        for patience in Patience:
+            self.patience, self.is_postponed, self.doubt = patience, False, None
+            found = self._search_witness() or self._through_outcomes()
+            if not self.is_postponed or isinstance(found, Refuted | Satisfied):
+                return found
+            yield Patience(patience + 1)
+        raise AssertionError("no step takes more than all patience")
+
+    def _through_outcomes(self) -> Outcome:
+        """What comes of it outcome by outcome, as far as patience goes."""
         unsettled: Undecided | None = None
-        for component in self.components:
+        for number, component in enumerate(self.components):
             if not component.slots:
-                outcome = self._by_solver([part.item for part in component.parts])
+                outcome = self._together(number, {})
                 if isinstance(outcome, Refuted):
                     return outcome
                 if isinstance(outcome, Undecided):
                     unsettled = outcome
-                else:
-                    values.update(outcome.values)
         try:
             for assignment in self._assignments():
-                return unsettled or self._values(assignment, values)
+                return unsettled or self._values(assignment)
         except Exhausted as error:
             return Undecided.by(self.items[0][0], error)
         if self.doubt is not None:
@@ -266,21 +266,26 @@ class _ChoiceSearch:
         assignment: Mapping[int, int],
         decide: Decide,
     ) -> Outcome:
-        """What is decided of constraints for the outcomes of their slots, once."""
+        """What is decided of constraints for the outcomes of their slots, as far as patience goes."""
         key = (number, tuple([(slot, assignment[slot]) for slot in sorted(slots)]))
         if key not in self.known:
-            self.known[key] = self._decided(parts, lookups, slots, assignment, decide)
-        return self.known[key]
+            self.known[key] = Search(self._decided(parts, lookups, slots, dict(assignment), decide))
+        outcome = self.known[key].within(self.patience)
+        if outcome is None:
+            self.is_postponed = True
+            return Undecided(self.items[0][0], "postponed")
+        return outcome
 
     def _together(self, number: int, assignment: Mapping[int, int]) -> Outcome:
         """What is decided of a component all of whose slots are assigned."""
         one = self.components[number]
-        return self._of(number, one.parts, one.lookups, one.slots, assignment, self._by_solver)
+        return self._of(number, one.parts, one.lookups, one.slots, assignment, self._by_all_means)
 
-    def _by_solver(self, items: list[Item]) -> Outcome:
-        outcome = self.decide(items)
-        undecided = isinstance(outcome, Undecided) and outcome.reason != POSTPONED
-        return self.ask([items]) if undecided and self.ask is not None else outcome
+    def _by_all_means(self, items: list[Item]) -> Steps:
+        outcome = yield from self.decide(items)
+        if isinstance(outcome, Undecided) and self.at_last is not None:
+            return (yield from self.at_last([items]))
+        return outcome
 
     def _decided(
         self,
@@ -289,7 +294,7 @@ class _ChoiceSearch:
         slots: frozenset[int],
         assignment: Mapping[int, int],
         decide: Decide,
-    ) -> Outcome:
+    ) -> Steps:
         given, taken = self._given(slots, assignment)
         asked = {id(lookup) for lookup in lookups}
         memo: dict[int, Node] = {id(node): Constant(float(pick), span=node.span) for node, pick in taken}
@@ -306,7 +311,8 @@ class _ChoiceSearch:
         left = [item for item in left if not isinstance(item[1], Constant)]
         if not left:
             return Satisfied({})
-        found = decide_with_choices(left, self.tolerance, decide, depth=self.depth + 1) or decide(left)
+        found = yield from search_choices(left, self.tolerance, decide, depth=self.depth + 1)
+        found = found or (yield from decide(left))
         if isinstance(found, Satisfied) or found.constraint in self.constraints:
             return found
         return replace(found, constraint=self.items[0][0] if not parts else parts[0].item[0])
@@ -326,12 +332,10 @@ class _ChoiceSearch:
                     taken[id(variable)] = (variable, pick)
         return given, list(taken.values())
 
-    def _values(self, assignment: Mapping[int, int], values: Mapping[Identity, Value]) -> Satisfied:
+    def _values(self, assignment: Mapping[int, int]) -> Satisfied:
         """Values of all random variables."""
-        found = dict(values)
-        for number, component in enumerate(self.components):
-            if not component.slots:
-                continue
+        found: dict[Identity, Value] = {}
+        for number in range(len(self.components)):
             outcome = self._together(number, assignment)
             if isinstance(outcome, Satisfied):
                 found.update(outcome.values)

@@ -8,22 +8,26 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 from scenicq.budget import Exhausted, Trials, look
 from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.groups import PARAMS, Group
 from scenicq.forest.nodes import Value
 from scenicq.limits import LIMITS
-from scenicq.match.decide.decomposition import decide_decomposed
+from scenicq.match.decide.decomposition import chooses_apart, search_decomposed
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import LabelProblem
-from scenicq.match.problem.conditioned import Item, condition_group, uses_field
+from scenicq.match.problem.conditioned import Item, LabelNodes, uses_field
 from scenicq.match.problem.likely_values import likely_group
 from scenicq.match.problem.map_lookups import MapLookups
-from scenicq.match.problem.outcome import POSTPONED, UNOBSERVED, Outcome, Patience, Refuted, Satisfied, Undecided
+from scenicq.match.problem.outcome import UNOBSERVED, Outcome, Patience, Refuted, Satisfied, Search, Steps, Undecided
 from scenicq.match.problem.radius import within_radius
-from scenicq.match.search.choice_search import Ask, decide_with_choices
+from scenicq.match.search.choice_search import Ask, AtLast, search_choices
 from scenicq.match.search.group_plan import GroupPlan
+
+if TYPE_CHECKING:  # takes long to load
+    from scenicq.match.fields.heading_propagation import DirectedCases, KnownCases
 
 __all__ = ["GroupCache", "known_of", "surely", "translated"]
 
@@ -38,7 +42,7 @@ class GroupCache:
         ask: The solver.
         lookups: What is known of the map.
         trials: How often all searches for witnesses may try in vain.
-        patience: What may take long now; the rest is postponed.
+        patience: What may take long now; the rest goes on when there is more.
     """
 
     options: MatchOptions
@@ -47,18 +51,15 @@ class GroupCache:
     lookups: MapLookups
     trials: Trials = field(default_factory=lambda: Trials(LIMITS.witness_trials))
     patience: Patience = Patience.ALL
-    _known: dict[tuple[int, tuple[int, ...]], tuple[Group, Outcome]] = field(
-        default_factory=dict["tuple[int, tuple[int, ...]]", "tuple[Group, Outcome]"]
+    _nodes: LabelNodes = field(default_factory=LabelNodes)
+    _cases: KnownCases = field(default_factory=dict["tuple[object, ...]", "DirectedCases"])
+    _known: dict[tuple[int, tuple[int, ...]], tuple[Group, Search]] = field(
+        default_factory=dict["tuple[int, tuple[int, ...]]", "tuple[Group, Search]"]
     )
 
     def has_postponed(self) -> bool:
-        """Whether a question is postponed."""
-        return any(_is_postponed(outcome) for _, outcome in self._known.values())
-
-    def have(self, patience: Patience) -> None:
-        """Have more patience, or less: what is postponed may be decided anew."""
-        self._known = {key: known for key, known in self._known.items() if not _is_postponed(known[1])}
-        self.patience = patience
+        """Whether a question takes more patience."""
+        return not all(search.is_finished for _, search in self._known.values())
 
     def items(self, group: Group, assignment: Mapping[int, int]) -> list[Item]:
         """The constraints of a group given the label (algorithm 1, line 11).
@@ -72,7 +73,7 @@ class GroupCache:
             for name, value in self.problem.seen[assignment[index]].items()
         }
         observed.update({(PARAMS, name): value for name, value in self.problem.params.items()})
-        items = condition_group(group, observed)
+        items = self._nodes.items(group, observed, assignment)
         return items if self.problem.disc is None else within_radius(items, *self.problem.disc)
 
     def of(self, plan: GroupPlan, assignment: Mapping[int, int]) -> tuple[Group, Outcome]:
@@ -80,11 +81,17 @@ class GroupCache:
         key = (plan.kind, tuple([assignment[index] for index in plan.roles]))
         known = self._known.get(key)
         if known is None:
-            outcome = self._in_closed_form(plan, assignment) or self._by_cascade(plan.group, assignment)
-            if plan.group.doubtful and isinstance(outcome, Satisfied):
-                outcome = known_of(plan.group, self._by_cascade(surely(plan.group), assignment))
-            known = self._known[key] = (plan.group, outcome)
-        return known
+            known = self._known[key] = (plan.group, Search(self._steps(plan, dict(assignment))))
+        group, search = known
+        with self.trials:
+            outcome = search.within(self.patience)
+        return group, Undecided(group.constraints[0], "postponed") if outcome is None else outcome
+
+    def _steps(self, plan: GroupPlan, assignment: Mapping[int, int]) -> Steps:
+        outcome = self._in_closed_form(plan, assignment) or (yield from self._by_cascade(plan.group, assignment))
+        if plan.group.doubtful and isinstance(outcome, Satisfied):
+            return known_of(plan.group, (yield from self._by_cascade(surely(plan.group), assignment)))
+        return outcome
 
     def _in_closed_form(self, plan: GroupPlan, assignment: Mapping[int, int]) -> Outcome | None:
         """What a closed form says, if it is clear."""
@@ -93,40 +100,39 @@ class GroupCache:
         seen = self.problem.seen
         return plan.closed_form.decide(lambda index, name: seen[assignment[index]][name], self.options, self.lookups)
 
-    def _by_cascade(self, group: Group, assignment: Mapping[int, int]) -> Outcome:
+    def _by_cascade(self, group: Group, assignment: Mapping[int, int]) -> Steps:
         try:
             look()
             if self.options.method == "smt":
                 return self.ask([self.items(group, assignment)])
-            with self.trials:
-                likely = likely_group(group)
-                if likely is not None:
-                    found = self._decided(self.items(likely.group, assignment), self._searched)
-                    if isinstance(found, Satisfied):
-                        return likely.restored(found)
-                    if self.patience < Patience.ALL:
-                        return Undecided(group.constraints[0], POSTPONED)
-                return self._decided(self.items(group, assignment), self._at_last)
+            likely = likely_group(group)
+            if likely is not None:
+                found = yield from self._decided(self.items(likely.group, assignment), self._searched)
+                if isinstance(found, Satisfied):
+                    return likely.restored(found)
+                yield Patience.ALL
+            return (yield from self._decided(self.items(group, assignment), self._at_last))
         except CannotEvaluate as error:
             return Undecided(group.constraints[0], f"unsupported: {error}")
         except Exhausted as error:
             return Undecided.by(group.constraints[0], error)
 
-    def _decided(self, items: list[Item], at_last: Ask) -> Outcome:
+    def _decided(self, items: list[Item], at_last: AtLast) -> Steps:
         """What the cascade says of constraints, and where it says nothing, what is asked at last."""
-        tolerance, patience = self.options.tolerance, self.patience
-
-        def decide(left: list[Item]) -> Outcome:
-            return decide_decomposed(left, tolerance, patience)
-
-        chosen = decide_with_choices(items, tolerance, decide, at_last, patience=patience)
+        tolerance = self.options.tolerance
+        if chooses_apart(items):
+            found = yield from search_decomposed(items, tolerance, self._cases)
+            if not isinstance(found, Undecided):
+                return found
+        chosen = yield from search_choices(items, tolerance, lambda left: search_decomposed(left, tolerance), at_last)
         if chosen is not None:
             return chosen
-        outcome = decide(items)
-        return at_last([items]) if isinstance(outcome, Undecided) and not _is_postponed(outcome) else outcome
+        outcome = yield from search_decomposed(items, tolerance, self._cases)
+        return (yield from at_last([items])) if isinstance(outcome, Undecided) else outcome
 
-    def _searched(self, items: Sequence[Sequence[Item]]) -> Outcome:
+    def _searched(self, items: Sequence[Sequence[Item]]) -> Steps:
         """What comes of boxes; where fields are, these were looked at already."""
+        yield Patience.LIKELY
         flat = [item for group in items for item in group]
         if uses_field(flat):
             return Undecided(flat[0][0], "nonlinear")
@@ -134,16 +140,10 @@ class GroupCache:
 
         return branch_and_prune(flat, self.options.tolerance)
 
-    def _at_last(self, items: Sequence[Sequence[Item]]) -> Outcome:
+    def _at_last(self, items: Sequence[Sequence[Item]]) -> Steps:
         """What nothing else decides: branch and prune, then the solver."""
-        if self.patience is Patience.LITTLE:
-            return Undecided(items[0][0][0], POSTPONED)
-        found = self._searched(items)
+        found = yield from self._searched(items)
         return self.ask(items) if isinstance(found, Undecided) else found
-
-
-def _is_postponed(outcome: Outcome) -> bool:
-    return isinstance(outcome, Undecided) and outcome.reason == POSTPONED
 
 
 def translated(decided: tuple[Group, Outcome], target: Group) -> Outcome:

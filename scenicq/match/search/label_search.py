@@ -15,13 +15,13 @@ from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.groups import Constraint, Group
 from scenicq.forest.scenario import Scenario
 from scenicq.limits import LIMITS
-from scenicq.match.decide.decomposition import decide_decomposed
+from scenicq.match.decide.decomposition import search_decomposed
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.bipartite_matching import Slot
 from scenicq.match.problem.candidates import LabelProblem
 from scenicq.match.problem.conditioned import Item
 from scenicq.match.problem.map_lookups import MapLookups
-from scenicq.match.problem.outcome import Outcome, Patience, Refuted, Satisfied, Undecided
+from scenicq.match.problem.outcome import Outcome, Patience, Refuted, Satisfied, Search, Undecided
 from scenicq.match.problem.symmetry import in_one_order
 from scenicq.match.search.arc_consistency import arc_consistent
 from scenicq.match.search.backtracking import Consistency, Reporter, find_assignments
@@ -124,7 +124,7 @@ class LabelSearch:
         # what is cheap may settle a label before what takes long is looked at
         for patience in Patience if self.options.method == "auto" else (Patience.ALL,):
             self._open = was_open
-            self._decisions.have(patience)
+            self._decisions.patience = patience
             judged = None if monolithic else self._slots(plan, candidates)
             found = self._monolithic(plan, candidates) if monolithic else self._modular(plan, judged)
             try:
@@ -138,7 +138,7 @@ class LabelSearch:
             except Exhausted as error:
                 if error.reason != "budget" or not self._decisions.has_postponed():
                     raise
-        self._decisions.have(Patience.ALL)
+        self._decisions.patience = Patience.ALL
         self._asked.append((plan, judged, twins))
 
     def open_ones(self) -> Iterator[tuple[MatchPlan, Failure]]:
@@ -259,7 +259,8 @@ class LabelSearch:
             return
         assignment = {**ego, index: candidates[index][0]}
         try:
-            found = decide_decomposed(self.items(blamed.group, assignment), self.options.tolerance, Patience.LITTLE)
+            steps = search_decomposed(self.items(blamed.group, assignment), self.options.tolerance)
+            found = Search(steps).within(Patience.LITTLE)
         except CannotEvaluate:
             found = None
         outcome = found if isinstance(found, Refuted) else Refuted(blamed.group.constraints[0])

@@ -7,16 +7,20 @@ from functools import cache
 
 import numpy as np
 import pytest
-from scenes import compiled, drawn, label_of
+from conditioned_groups import groups
+from hidden_roads import CHAIN
+from scenes import STREET, compiled, drawn, label_of
 from shapely import LineString
 
 from scenicq.geometry.features import MapFeature
 from scenicq.geometry.network import Network
+from scenicq.match.decide.decomposition import decide_decomposed, search_decomposed
 from scenicq.match.fields import field_solver, heading_propagation, witness_search
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
+from scenicq.match.problem.outcome import Patience, Search
 from scenicq.match.search import choice_search
-from scenicq.match.tolerance import parse_tolerance
+from scenicq.match.tolerance import EXACT, parse_tolerance
 from scenicq.match.verdict import Match, NoMatch
 from scenicq.store.labels import Label, LabelObject
 
@@ -87,10 +91,49 @@ def test_what_another_group_excludes_is_not_gone_into(matcher, cases):
     assert cases[0] < 1500, "the heading alone excludes it"
 
 
+def test_more_patience_goes_on_where_less_has_stopped(cases, monkeypatch):
+    monkeypatch.setattr(field_solver, "find_witness", lambda *_, **__: None)
+    several = 0
+    for seed in range(3):
+        for items, _ in groups(CHAIN.format(cars=2), seed):
+            cases[0] = 0
+            outcome = decide_decomposed(items, TOLERANCE)
+            whole, cases[0] = cases[0], 0
+            search = Search(search_decomposed(items, TOLERANCE))
+            found = [search.within(patience) for patience in Patience]
+            assert type(found[-1]) is type(outcome)
+            assert cases[0] == whole, "nothing is looked at twice"
+            several += found[0] is None
+    assert several
+
+
+def test_what_two_groups_ask_of_the_same_objects_is_looked_for_once(monkeypatch):
+    """A second car hangs on the first; the ways of the first are those for any candidate of the second."""
+    asked = []
+
+    class Noted(heading_propagation.DirectedCases):
+        def __init__(self, start, soon):
+            ranges = tuple((key, value.tobytes()) for key, value in start.ranges.items())
+            asked.append((tuple((constraint, seen) for constraint, _, seen in start.network.items), ranges))
+            super().__init__(start, soon)
+
+    monkeypatch.setattr(field_solver, "DirectedCases", Noted)
+    monkeypatch.setattr(field_solver, "find_witness", lambda *_, **__: None)
+    scenario = compiled("model scenic.domains.driving.model\n" + CHAIN.format(cars=2), STREET)
+    most = 0
+    for seed in range(3):
+        asked.clear()
+        label = label_of(scenario, drawn(scenario, seed), random.Random(seed), distractors=2)
+        assert isinstance(Matcher(scenario, MatchOptions(tolerance=EXACT, timeout_s=60)).match(label), Match)
+        assert len(set(asked)) == len(asked)
+        most = max(most, len(asked))
+    assert most > 2
+
+
 def test_unlikely_values_are_looked_at_last(monkeypatch):
     asked = []
-    decide = field_solver.decide_directions
-    monkeypatch.setattr(field_solver, "decide_directions", lambda *a, **k: asked.append(a) or decide(*a, **k))
+    search = field_solver.search_directions
+    monkeypatch.setattr(field_solver, "search_directions", lambda *a, **k: asked.append(a) or search(*a, **k))
     text = "model scenic.domains.driving.model\nego = new Car at (0, -35), facing 0 deg\n"
     text += "other = new Car following roadDirection from ego for Normal(16.5, 2.7)\n"
     matcher = Matcher(compiled(text, junction()), MatchOptions(tolerance=TOLERANCE, timeout_s=20))
