@@ -41,10 +41,12 @@ from scenicq.compiler.values import (
     ScenicClass,
     describe,
     fail,
+    is_node,
 )
 from scenicq.errors import Diagnostic, ScenarioError, Span
 from scenicq.forest import build
-from scenicq.forest.nodes import Node
+from scenicq.forest.nodes import Feature, Node
+from scenicq.forest.walk import postorder
 from scenicq.geometry.network import Network
 from scenicq.geometry.regions import Everywhere
 from scenicq.syntax import ast
@@ -210,7 +212,7 @@ class Interpreter:
             lambda: self.workspace,
             self.budget,
             self.network,
-            self.excluded.may_lack,
+            self._may_lack,
             is_object=is_object,
         )
         kept = [node for node in specifiers if not self._is_dynamic(node)]
@@ -224,6 +226,19 @@ class Interpreter:
             self.objects.append(instance)
         construct(instance, bound, self)
         return instance
+
+    def _may_lack(self, index: Node) -> bool:
+        """Whether some option of a choice lacks a part that the program asks for, or of one that its index hangs on."""
+        todo, seen = [index], set[tuple[int, str]]()
+        while todo:
+            for node in postorder([todo.pop()]):
+                if self.excluded.may_lack(node):
+                    return True
+                if isinstance(node, Feature) and node.object >= 0 and (node.object, node.property) not in seen:
+                    seen.add((node.object, node.property))
+                    value = self.objects[node.object].properties.get(node.property)
+                    todo += [cast(Node, value)] if is_node(value) else []
+        return False
 
     def _is_dynamic(self, node: ast.Specifier) -> bool:
         if not (isinstance(node, ast.WithSpecifier) and node.property == "behavior"):

@@ -45,6 +45,14 @@ def test_what_lies_on_a_part_that_some_elements_lack_has_either_heading(place: s
     assert found == ({Range, DirectionAt} if either else {DirectionAt})
 
 
+@pytest.mark.parametrize(("place", "either"), [("ego.laneGroup.opposite", True), ("ego.laneGroup", False)])
+@pytest.mark.parametrize("found", ["network.laneAt(before)", "network.laneAt(spot)", "network.laneGroupAt(after)"])
+def test_so_has_what_is_looked_up_where_such_a_part_is(place: str, found: str, either: bool) -> None:
+    text = f"before = new Car on {place}\nspot = new Point on {place}\nafter = new Car on network.laneAt(before)\n"
+    heading = heading_of_the_last(f"{text}new Pedestrian on {found}\n")
+    assert any(isinstance(node, Range) for node in postorder([heading])) is either
+
+
 @pytest.mark.parametrize("base", ["ego.lane.centerline", "network.lanes[0].centerline", "network.lanes[0].leftEdge"])
 @pytest.mark.parametrize("taken", ["intersection", "CircularRegion((0, 0), 4)", "ego.laneSection"])
 @pytest.mark.parametrize("more", ["", ".intersect(road)", ".difference(sidewalk)"])

@@ -203,7 +203,8 @@ def excuse(text: str, scene: dict[str, Any], why: str = "") -> str:
     """The known difference that may keep a scene from matching, or nothing; `why` is what ours refuses."""
     if why.startswith("wrong-value") and "must be positive" in why:
         return "size that is not positive"
-    if re.search(r"Point on (?:ego|o\d+)\b", text) and "distance" in text:
+    on_object = re.search(r"(\w+) = new (?:Oriented)?Point on (?:ego|o\d+)\b", text)
+    if on_object and ("distance" in text or f"beyond {on_object[1]}" in text):
         return "height of a point on an object"
     return ""
 
