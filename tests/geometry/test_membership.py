@@ -25,6 +25,7 @@ from scenicq.geometry.regions import (
     UnionOf,
     difference,
 )
+from scenicq.geometry.terms import terms
 
 from . import oracle
 
@@ -152,3 +153,21 @@ def test_parts_near_a_box_are_those_whose_boxes_meet_it() -> None:
             if west - 3.0 <= x <= west + 11.0 and south - 3.0 <= y <= south + 8.0
         ]
         assert membership.parts_near(union, around) == near
+
+
+def test_of_many_parts_those_close_by_alone_are_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
+    squares = tuple(box(3.0 * x, 3.0 * y, 3.0 * x + 2.0, 3.0 * y + 2.0) for x in range(20) for y in range(20))
+    region = IntersectionOf((PolygonSet(squares, "squares"), Disc((30.0, 30.0), 24.0)))
+    asked: list[object] = []
+    real = membership.closest_point
+    monkeypatch.setattr(membership, "closest_point", lambda term, x, y: asked.append(term) or real(term, x, y))
+    for place, nearest in (((32.5, 31.0), (32.0, 31.0)), ((60.5, 30.5), None)):
+        asked.clear()
+        found = membership.nearest_point(region, *place)
+        assert found is not None
+        assert nearest is None or found == pytest.approx(nearest)
+        least = min(
+            math.dist(place, each) for each in (real(term, *place) for term in terms(region, (0, 0, 60, 60))) if each
+        )
+        assert math.dist(place, found) == pytest.approx(least)
+        assert len(asked) < 12
