@@ -224,9 +224,7 @@ class Limits:
         "below which an interval of the number that parts share is not divided any more",
         "nonlinear",
     )
-    pruned_boxes: int = _otherwise(
-        4096, "boxes", "that a group is divided into, of which something is left", "a solver is asked"
-    )
+    pruned_boxes: int = _undecided(4096, "boxes", "that a group is divided into, of which something is left", "budget")
     narrowing_passes: int = _coarser(
         6, "passes", "in which the ranges of random variables are narrowed", "the ranges stay wider"
     )
@@ -256,22 +254,8 @@ class Limits:
     enclosing_edges: int = _undecided(400, "edges", "of a region that holds a random box", "unsupported")
     rounded_values: int = _undecided(1000, "values", "of a number that is rounded down", "unsupported")
     integer_values: int = _undecided(1000, "values", "of a random whole number", "unsupported")
-    formula_nesting: int = _undecided(
-        100,
-        "choices",
-        "in one another, in a question to the portable solver",
-        "unsupported: conjunctions and disjunctions nested too deep",
-    )
     split_cases: int = _coarser(
         64, "alternatives", "of a question that is asked again one by one", "the question is not asked again"
-    )
-    solver_boxes: int = _undecided(100_000, "boxes", "that the portable solver looks at", "budget")
-    solver_patience: int = _otherwise(
-        400, "boxes", "that it looks at after a point within the precision was met", "that point is the answer"
-    )
-    solver_sweeps: int = _coarser(8, "rounds", "in which it narrows one box", "the box is split")
-    solver_reach: float = _undecided(
-        1e12, "metres, radians, ...", "from 0 to which it searches ranges without an end", "budget"
     )
     dreal_conjunctions: int = _otherwise(
         1_000_000,

@@ -302,15 +302,15 @@ def test_backtracking_knows_no_geometry():
     assert imports(LIBRARY / "match/problem/bipartite_matching.py") == set()
 
 
-def test_the_portable_solver_knows_formulas_and_no_nodes():
-    todo, seen = ["portable"], set[str]()
+def test_a_solver_in_a_process_of_its_own_knows_formulas_and_no_nodes():
+    todo, seen = ["dreal", "worker"], set[str]()
     while todo:
         name = todo.pop()
         seen.add(name)
         for module in imports(LIBRARY / f"smt/{name}.py"):
-            assert module.startswith(("scenicq.smt.", "scenicq.budget", "scenicq.limits")), (name, module)
+            assert not module.startswith(("scenicq.forest", "scenicq.geometry")), (name, module)
             todo += {module.removeprefix("scenicq.smt.")} - seen if module.startswith("scenicq.smt.") else ()
-    assert {"interval", "affine", "hc4"} <= seen
+    assert {"formula", "inverse_elimination"} <= seen
 
 
 def test_every_step_of_matching_is_one_that_is_measured():

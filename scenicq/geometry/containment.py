@@ -11,22 +11,25 @@ from numpy.typing import NDArray
 from shapely.geometry import Polygon
 
 from scenicq.geometry import shapes
-from scenicq.geometry.membership import bounds
-from scenicq.geometry.proximity import meets
+from scenicq.geometry.membership import bounds, may_be_within
+from scenicq.geometry.proximity import meets, meets_many
 from scenicq.geometry.regions import (
+    SLACK,
+    DifferenceOf,
     Disc,
     Everywhere,
     IntersectionOf,
     PolygonSet,
     Rectangle,
     Region,
+    Sector,
     UnionOf,
     difference,
     intersection,
 )
 from scenicq.geometry.terms import overlap, rectangle_shape
 
-__all__ = ["covers", "covers_many", "overlaps"]
+__all__ = ["covers", "covers_many", "missed_areas", "overlaps", "surely_covers_many"]
 
 Answer: TypeAlias = bool | None
 """None where it cannot be told: a region removes too many separate discs, or has no end."""
@@ -69,16 +72,63 @@ def covers(outer: Region, box: Polygon) -> Answer:
 
 def covers_many(outer: PolygonSet, boxes: NDArray[np.object_]) -> NDArray[np.bool_]:
     """`covers` for an array (n,) of convex polygons; a boolean array (n,)."""
+    return missed_areas(outer, boxes) <= _SLIVER * shapes.areas(boxes)
+
+
+def missed_areas(outer: PolygonSet, boxes: NDArray[np.object_]) -> NDArray[np.float64]:
+    """The area in square metres of each of some convex polygons (n,) that does not lie in the region, (n,)."""
     owner, hit = shapes.tree_pairs(outer.tree, boxes)
     pieces, count = shapes.array(outer.pieces), np.bincount(owner, minlength=len(boxes))
     whole = shapes.areas(boxes)
     missed = np.where(count == 0, whole, 0.0)
     alone = count[owner] == 1
     missed[owner[alone]] = shapes.areas(shapes.difference_many(boxes[owner[alone]], pieces[hit[alone]]))
-    found = missed <= _SLIVER * whole
     for number in np.flatnonzero(count > 1).tolist():
-        found[number] = _together(pieces[np.sort(hit[owner == number])].tolist(), boxes[number])
+        together = shapes.union_all(pieces[np.sort(hit[owner == number])].tolist())
+        missed[number] = shapes.difference(boxes[number], together).area
+    return missed
+
+
+def surely_covers_many(outer: Region, boxes: NDArray[np.object_]) -> NDArray[np.bool_]:
+    """Whether no point of convex polygons (n,) of equally many corners lies outside of a region, (n,).
+
+    It may be false where it is not known, such as across pieces that leave slivers open between them.
+    """
+    found = np.zeros(len(boxes), dtype=bool)
+    match outer:
+        case Everywhere():
+            return ~found
+        case PolygonSet():
+            owner, hit = shapes.tree_pairs(outer.tree, boxes)
+            pieces, count = shapes.array(outer.pieces), np.bincount(owner, minlength=len(boxes))
+            found[owner[shapes.covers_many(pieces[hit], boxes[owner])]] = True
+            for number in np.flatnonzero(~found & (count > 1)).tolist():
+                together = shapes.union_all(pieces[np.sort(hit[owner == number])].tolist())
+                found[number] = shapes.covers(together, boxes[number])
+        case Disc() | Rectangle():
+            found = _holds_corners(outer, boxes)
+        case Sector() if outer.angle <= math.pi:
+            found = _holds_corners(outer, boxes)
+        case UnionOf():
+            for part in outer.parts:
+                found[~found] = surely_covers_many(part, boxes[~found])
+        case IntersectionOf():
+            found = ~found
+            for part in outer.parts:
+                found[found] = surely_covers_many(part, boxes[found])
+        case DifferenceOf():
+            found = surely_covers_many(outer.base, boxes)
+            found[found] = ~meets_many(outer.removed, boxes[found], np.zeros(int(found.sum())))
+        case _:
+            pass
     return found
+
+
+def _holds_corners(convex: Disc | Rectangle | Sector, boxes: NDArray[np.object_]) -> NDArray[np.bool_]:
+    """Whether all corners of polygons (n,) lie in a convex region, a little less of the slack left than others have."""
+    corners = shapes.coordinates_of_many(boxes)
+    inside = may_be_within(convex, corners.reshape(-1, 2), -SLACK / 2)
+    return np.logical_and.reduce(inside.reshape(corners.shape[:2]), axis=1)
 
 
 def _together(pieces: Sequence[shapes.Shape], box: Polygon) -> bool:

@@ -9,6 +9,8 @@ import math
 from collections.abc import Iterator
 from typing import assert_never
 
+import numpy as np
+from numpy.typing import NDArray
 from shapely.geometry import Point
 
 from scenicq.geometry import shapes
@@ -33,7 +35,7 @@ from scenicq.geometry.regions import (
 from scenicq.geometry.shapes import XY, Bounds, Shape
 from scenicq.geometry.terms import Circle, Term, UndecidedError, both, rectangle_shape, terms
 
-__all__ = ["meets", "witness_point"]
+__all__ = ["meets", "meets_many", "witness_point"]
 
 
 def meets(region: Region, shape: Shape, radius: float = 0.0) -> bool | None:
@@ -53,6 +55,27 @@ def meets(region: Region, shape: Shape, radius: float = 0.0) -> bool | None:
         return _meets(region, shape, radius)
     except UndecidedError:
         return None
+
+
+def meets_many(
+    region: Region, some: NDArray[np.object_], radius: NDArray[np.float64], *, surely: bool = False
+) -> NDArray[np.bool_]:
+    """`meets` for shapes and radii (n,), which may be true where it is not known; or, if told so, false; (n,)."""
+    match region:
+        case PolygonSet() | PolylineSet() | PointSet():
+            found = np.zeros(len(some), dtype=bool)
+            found[shapes.tree_pairs_within(region.tree, some, radius + SLACK)[0]] = True
+            return found
+        case Disc() if region.radius >= 0:
+            return shapes.distances(some, shapes.point(*region.center)) <= region.radius + radius + SLACK
+        case Rectangle():
+            return shapes.distances(some, rectangle_shape(region)) <= radius + SLACK
+        case UnionOf():
+            parts = [meets_many(part, some, radius, surely=surely) for part in region.parts]
+            return np.any(parts, axis=0) if parts else np.zeros(len(some), dtype=bool)
+        case _:
+            answers = [meets(region, shape, reach) for shape, reach in zip(some, radius.tolist(), strict=True)]
+            return np.array([not surely if answer is None else answer for answer in answers], dtype=bool)
 
 
 def witness_point(region: Region, shape: Shape, radius: float = 0.0) -> XY | None:

@@ -300,6 +300,22 @@ def coordinates(shape: Shape) -> Coordinates:
     return shapely.get_coordinates(shape)
 
 
+def no_shapes(count: int) -> NDArray[Any]:
+    """Array (n,) without a shape, for some to be put in."""
+    return np.full(count, None, dtype=object)  # type: ignore[call-overload]
+
+
+def are_there(geometries: NDArray[Any]) -> NDArray[np.bool_]:
+    """Where an array (n,) has a shape."""
+    return ~shapely.is_missing(geometries)
+
+
+def coordinates_of_many(geometries: NDArray[Any]) -> NDArray[np.float64]:
+    """All vertices of shapes (n,) that have equally many, shape (n, k, 2)."""
+    found = shapely.get_coordinates(geometries)
+    return found.reshape(len(geometries), -1, 2) if len(geometries) else np.empty((0, 0, 2))
+
+
 def edges(shape: Shape) -> NDArray[np.float64]:
     """The segments that bound a shape, (n, 4) rows x0, y0, x1, y1; a point is a segment of no length."""
     parts = simple_parts([shape])

@@ -25,7 +25,7 @@ from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import Candidates, egos, find_candidates
 from scenicq.match.problem.conditioned import Item
 from scenicq.match.problem.map_lookups import MapLookups
-from scenicq.match.problem.outcome import Outcome
+from scenicq.match.problem.outcome import Outcome, Undecided
 from scenicq.match.problem.preprocess import ready
 from scenicq.match.search.backtracking import Reporter
 from scenicq.match.search.batch_lookups import look_up_positions
@@ -51,7 +51,7 @@ class Matcher:
     Attributes:
         scenario: The scenario, made ready to be matched.
         options: The options.
-        solver: Decides what the cascade does not; None makes those groups unknown.
+        solver: Asked about what nothing of our own decides, or about everything; None for the built-in solver.
         plans: The analysis of the scenario, made for the first label of a kind and kept.
     """
 
@@ -121,9 +121,9 @@ class Matcher:
         alike = options.tolerance.for_scenario(self.scenario).same_scopes(self.options.tolerance)
         return Matcher(self.scenario, options, self.solver, self.plans if alike else None)
 
-    def ask(self, items: Sequence[Sequence[Item]]) -> Outcome:
-        """Decide groups together by the solver."""
-        return ask(items, self.options, self.solver)
+    def ask(self, items: Sequence[Sequence[Item]], doubt: Undecided | None = None) -> Outcome:
+        """Decide groups together by the solver; the doubt is what the built-in one has left undecided."""
+        return ask(items, self.options, self.solver, doubt)
 
     def _decided(
         self, labels: Sequence[Asked], lookups: MapLookups, reporter: Reporter | None, given: Mapping[str, str],

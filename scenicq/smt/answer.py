@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from types import TracebackType
 from typing import Protocol, Self
@@ -69,6 +69,14 @@ class Solver(Protocol):
         """What the solver is called in messages."""
         ...
 
+    def loads(self) -> bool:
+        """Whether there is anybody to ask; where not, the built-in solver decides, which this folder does not know.
+
+        Raises:
+            SolverError: What was asked for by name cannot be loaded or started.
+        """
+        ...
+
     def check(self, problem: Problem, *, precision: float, timeout_s: float) -> Answer:
         """Decide one problem.
 
@@ -83,10 +91,6 @@ class Solver(Protocol):
 
 class SolverSession(Solver, Protocol):
     """A solver with resources, to be used in a `with` statement; threads may share it."""
-
-    def check_many(self, problems: Sequence[Problem], *, precision: float, timeout_s: float) -> list[Answer]:
-        """Decide problems side by side; the answers come in the order of the problems, each with its own timeout."""
-        ...
 
     def close(self) -> None:
         """Give all resources back; the solver cannot be used afterwards."""

@@ -12,7 +12,6 @@ import shutil
 import subprocess
 import threading
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from types import TracebackType
 from typing import IO, Self
 
@@ -31,19 +30,17 @@ __all__ = ["SmtlibSolver"]
 class SmtlibSolver:
     """A solver behind a command line; threads may share it."""
 
-    def __init__(self, command: str, *, jobs: int = 1, memory_mb: int | None = None) -> None:
+    def __init__(self, command: str, *, memory_mb: int | None = None) -> None:
         """Take a command line, in the quoting of a POSIX shell, that runs without a shell.
 
         Args:
             command: The command line.
-            jobs: Processes at a time at most.
             memory_mb: Address space of each process (Linux).
 
         Raises:
             SolverError: The command is not there or cannot be started.
         """
         self._command = command
-        self._jobs = max(1, jobs)
         self._memory_mb = memory_mb
         try:
             self._words = shlex.split(command)
@@ -74,13 +71,9 @@ class SmtlibSolver:
             return NoAnswer("precision")
         return answer
 
-    def check_many(self, problems: Sequence[Problem], *, precision: float, timeout_s: float) -> list[Answer]:
-        """Decide problems side by side; the answers come in the problems' order."""
-        with ThreadPoolExecutor(self._jobs) as threads:
-            asked = [
-                threads.submit(self.check, problem, precision=precision, timeout_s=timeout_s) for problem in problems
-            ]
-            return [future.result() for future in asked]
+    def loads(self) -> bool:
+        """The command is there; see `Solver.loads`."""
+        return True
 
     def close(self) -> None:
         """Do nothing: no process outlives its problem."""

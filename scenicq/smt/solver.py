@@ -1,4 +1,4 @@
-"""Choosing a solver by name: the entry point of this folder."""
+"""Choosing a solver by name: the entry point of this folder, which knows those outside of this library alone."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from scenicq.limits import LIMITS
 from scenicq.smt.answer import Answer, NoAnswer, Sat, Solver, SolverSession, SolverStatus, Unsat
 from scenicq.smt.command import SmtlibSolver
 from scenicq.smt.formula import TRUE, Problem
-from scenicq.smt.pool import DREAL, PORTABLE, WorkerSolver
+from scenicq.smt.worker_solver import WorkerSolver
 
 __all__ = [
     "Answer",
@@ -24,29 +24,36 @@ __all__ = [
 ]
 
 
-def open_solver(name: str = "auto", *, jobs: int = 1, memory_mb: int | None = LIMITS.solver_memory_mb) -> SolverSession:
+PORTABLE = "portable"
+"""The name of the built-in solver, which works on expressions and not on formulas: the matcher has it."""
+DREAL = "scenicq.smt.dreal:check"
+
+
+def open_solver(name: str = "auto", *, memory_mb: int | None = LIMITS.solver_memory_mb) -> SolverSession | None:
     """Open a solver, to be used in a `with` statement.
 
     Args:
-        name: "auto" (dReal where it loads, else the portable solver), "dreal", "portable", or a command line that reads
-            SMT-LIB 2 from its standard input, such as `z3 -in`.
-        jobs: Worker processes at most; they start when needed.
+        name: "auto" (dReal where it loads, else the built-in solver), "dreal", "portable" (the built-in one), or a
+            command line that reads SMT-LIB 2 from its standard input, such as `z3 -in`.
         memory_mb: Address space of each solver process (Linux); None for no limit.
+
+    Returns:
+        The solver; None for the built-in one.
 
     Raises:
         SolverError: The solver cannot be loaded or started.
     """
-    if name == "portable":
-        return WorkerSolver(PORTABLE, jobs=jobs, memory_mb=memory_mb)
+    if name == PORTABLE:
+        return None
     if name not in ("auto", "dreal"):
-        return SmtlibSolver(name, jobs=jobs, memory_mb=memory_mb)
-    solver = WorkerSolver(DREAL, jobs=jobs, memory_mb=memory_mb)
+        return SmtlibSolver(name, memory_mb=memory_mb)
+    solver = WorkerSolver(DREAL, memory_mb=memory_mb)
     try:
         solver.start()
     except SolverError as error:
         solver.close()
         if name == "auto":
-            return open_solver("portable", jobs=jobs, memory_mb=memory_mb)
+            return None
         reason = error.diagnostics[0].label
         raise SolverError(
             Diagnostic("solver-missing", f"dReal does not load: {reason}", hints=_dreal_hints(reason))
@@ -55,23 +62,22 @@ def open_solver(name: str = "auto", *, jobs: int = 1, memory_mb: int | None = LI
 
 
 def available() -> list[SolverStatus]:
-    """Whether dReal and the portable solver can be used here, each tried in a child process."""
-    return [_status("dreal"), _status("portable")]
+    """Whether dReal can be used here, tried in a child process, and the built-in solver, which always can."""
+    return [_status_of_dreal(), SolverStatus(PORTABLE, ok=True, detail="built in")]
 
 
-def _status(name: str) -> SolverStatus:
-    kind = DREAL if name == "dreal" else PORTABLE
-    with WorkerSolver(kind) as solver:
+def _status_of_dreal() -> SolverStatus:
+    with WorkerSolver(DREAL) as solver:
         try:
             version = solver.start()
             answer = solver.check(Problem((), TRUE), precision=1e-3, timeout_s=10.0)
         except SolverError as error:
             reason = error.diagnostics[0].label
-            hints = _dreal_hints(reason) if name == "dreal" else ("reinstall scenicq",)
-            return SolverStatus(name, ok=False, detail=reason, hint="; ".join(hints))
+            return SolverStatus("dreal", ok=False, detail=reason, hint="; ".join(_dreal_hints(reason)))
     if answer != Sat({}):
-        return SolverStatus(name, ok=False, detail=f"a trivial problem is answered with {answer}", hint="reinstall it")
-    return SolverStatus(name, ok=True, detail=version or "built in")
+        said = f"a trivial problem is answered with {answer}"
+        return SolverStatus("dreal", ok=False, detail=said, hint="reinstall it")
+    return SolverStatus("dreal", ok=True, detail=version)
 
 
 def _dreal_hints(reason: str) -> tuple[str, ...]:

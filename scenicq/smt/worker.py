@@ -1,7 +1,7 @@
 """The inside of a worker process: reads problems from standard input, writes answers to what was standard output.
 
 Problems arrive pickled, answers leave as one line of JSON each. What a solver's library prints goes nowhere. The
-process ends when its standard input is closed, that is, at the latest with its parent. Read `pool` next.
+process ends when its standard input is closed, that is, at the latest with its parent. Read `worker_solver` next.
 """
 
 from __future__ import annotations

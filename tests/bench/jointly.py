@@ -35,8 +35,8 @@ from scenicq.match.matcher import Matcher  # noqa: E402
 from scenicq.match.options import MatchOptions, Method  # noqa: E402
 from scenicq.match.tolerance import EXACT  # noqa: E402
 from scenicq.match.verdict import Match, NoMatch  # noqa: E402
+from scenicq.query.execution.lazy_solver import LazySolver  # noqa: E402
 from scenicq.smt.answer import Solver  # noqa: E402
-from scenicq.smt.solver import open_solver  # noqa: E402
 from scenicq.store.labels import Label  # noqa: E402
 
 MAP = ROOT.parent / "shared" / "data" / "boston" / "maps" / "boston-seaport.geojson"
@@ -130,7 +130,8 @@ def main() -> None:
         labels = examples(scenario, given.labels)
         for name in given.solver or ("portable", "dreal"):
             try:
-                with open_solver(name) as solver:
+                with LazySolver(name) as solver:
+                    solver.loads()
                     for method in METHODS:
                         run = decided(scenario, labels, method, solver)
                         median, worst = statistics.median(run.times_ms), max(run.times_ms)

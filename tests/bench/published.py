@@ -32,7 +32,6 @@ from scenicq.errors import ScenarioError, Source  # noqa: E402
 from scenicq.geometry.network import Network  # noqa: E402
 from scenicq.match.matcher import Matcher  # noqa: E402
 from scenicq.match.options import MatchOptions  # noqa: E402
-from scenicq.smt.solver import open_solver  # noqa: E402
 from scenicq.store.dataset import open_dataset  # noqa: E402
 from scenicq.store.labels import Label  # noqa: E402
 
@@ -66,23 +65,22 @@ def measured(path: Path, labels: list[Label], maps: dict[str, Network]) -> dict[
     source = Source(str(path), path.read_text(encoding="utf-8"))
     matchers: dict[str, Matcher] = {}
     compiling, verdicts, times = 0.0, Counter[str](), list[float]()
-    with open_solver("portable") as solver:
-        for name, network in maps.items():
-            started = time.process_time()
-            try:
-                scenario = compile_scenario(source, network, initial=True)
-            except ScenarioError as error:
-                return {"refused": str(error).splitlines()[0]}
-            compiling = max(compiling, time.process_time() - started)
-            matchers[name] = Matcher(scenario, MatchOptions(classes="coarse"), solver)
-        for label in labels:
-            started = time.process_time()
-            try:
-                with patience(LIMIT_S):
-                    verdicts[type(matchers[label.map].match(label)).__name__] += 1
-            except OutOfPatienceError:
-                verdicts["late"] += 1
-            times.append(time.process_time() - started)
+    for name, network in maps.items():
+        started = time.process_time()
+        try:
+            scenario = compile_scenario(source, network, initial=True)
+        except ScenarioError as error:
+            return {"refused": str(error).splitlines()[0]}
+        compiling = max(compiling, time.process_time() - started)
+        matchers[name] = Matcher(scenario, MatchOptions(classes="coarse"))
+    for label in labels:
+        started = time.process_time()
+        try:
+            with patience(LIMIT_S):
+                verdicts[type(matchers[label.map].match(label)).__name__] += 1
+        except OutOfPatienceError:
+            verdicts["late"] += 1
+        times.append(time.process_time() - started)
     worst = max(times, default=0.0)
     return {"compile": compiling, "median": statistics.median(times), "worst": worst, "verdicts": dict(verdicts)}
 

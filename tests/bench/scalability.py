@@ -38,10 +38,10 @@ from scenicq.geometry.network import Network, read_geojson  # noqa: E402
 from scenicq.match.matcher import Matcher  # noqa: E402
 from scenicq.match.options import MatchOptions, Method  # noqa: E402
 from scenicq.match.verdict import Match, Unknown, Verdict  # noqa: E402
-from scenicq.smt.answer import Answer, NoAnswer, SolverSession  # noqa: E402
+from scenicq.query.execution.lazy_solver import LazySolver  # noqa: E402
+from scenicq.smt.answer import Answer, NoAnswer, Solver, SolverSession  # noqa: E402
 from scenicq.smt.formula import Problem  # noqa: E402
-from scenicq.smt.pool import WorkerSolver  # noqa: E402
-from scenicq.smt.solver import open_solver  # noqa: E402
+from scenicq.smt.worker_solver import WorkerSolver  # noqa: E402
 from scenicq.store.labels import Label  # noqa: E402
 
 HEADER = "model scenic.domains.driving.model\n"
@@ -76,7 +76,7 @@ class OutOfTime(Exception):
 class Patient:
     """A solver that gives up on a label once it has had its time."""
 
-    def __init__(self, session: SolverSession, patience_s: float) -> None:
+    def __init__(self, session: Solver, patience_s: float) -> None:
         self.name = session.name
         self.patience_s = patience_s
         self.deadline = math.inf
@@ -88,6 +88,10 @@ class Patient:
         """Whether the matcher is measured alone, without what it is compared with."""
         self._session = session
         self._ticks = 0
+
+    def loads(self) -> bool:
+        """Whether it is another one than the built-in solver."""
+        return self._session.loads()
 
     def begin(self) -> None:
         """Start the time of a label."""
@@ -189,7 +193,7 @@ def ways(scenario: Scenario, solver: Patient) -> list[Decider]:
         def decide(label: Label) -> bool:
             return matches(scenario, label, variant, solver, options, solver.tick)
 
-        return Decider(variant.name, decide, apart=solver.apart_from[variant.whole] if variant.process else None)
+        return Decider(variant.name, decide, apart=solver.apart_from.get(variant.whole) if variant.process else None)
 
     auto = matcher("auto")
 
@@ -200,18 +204,19 @@ def ways(scenario: Scenario, solver: Patient) -> list[Decider]:
         Decider(KNOWN, by_auto(given), known=True, rounds=ROUNDS),
         Decider(SHUFFLED, by_auto({}), rounds=ROUNDS),
     ]
-    return own if solver.alone else [*own, ours("smt"), ours("monolithic"), *map(published, VARIANTS)]
+    # the built-in solver is asked no formulas
+    theirs = map(published, VARIANTS if solver.loads() else ())
+    return own if solver.alone else [*own, ours("smt"), ours("monolithic"), *theirs]
 
 
 def _forking(name: str) -> dict[bool, SolverSession]:
     """A process for each formula, for those about cells and those with the whole map, which dReal takes as they are."""
-    if name == "dreal":
-        return {
-            False: WorkerSolver("forked_dreal:by_dreal", name=name),
-            True: WorkerSolver("forked_dreal:by_dreal_as_it_is", name=name),
-        }
-    both = WorkerSolver("forked:by_portable", name=name)
-    return {False: both, True: both}
+    if name != "dreal":
+        return {}
+    return {
+        False: WorkerSolver("forked_dreal:by_dreal", name=name),
+        True: WorkerSolver("forked_dreal:by_dreal_as_it_is", name=name),
+    }
 
 
 def run(name: str, sizes: tuple[int, ...], solver: Patient, network: Network) -> Results:
@@ -277,7 +282,8 @@ def experiment(
 ) -> None:
     """Run everything on one solver and keep it."""
     with ExitStack() as stack:
-        session = stack.enter_context(open_solver(name))
+        session = stack.enter_context(LazySolver(name))
+        session.loads()
         solver = Patient(session, patience_s)
         solver.alone = alone
         if not alone:

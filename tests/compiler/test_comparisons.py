@@ -12,7 +12,6 @@ from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import EXACT
 from scenicq.match.verdict import Match, NoMatch
-from scenicq.smt.solver import open_solver
 from scenicq.store.labels import Label, LabelObject
 
 from .scenes import compiled, value
@@ -42,18 +41,17 @@ def label(*places: tuple[float, float, float]) -> Label:
 @pytest.mark.parametrize("name", NUMBERS)
 def test_a_truth_value_is_one_or_zero_where_a_number_is_needed(name: str, method: str) -> None:
     scenario = compiled(A + NUMBERS[name])
-    with open_solver("portable") as solver:
-        matcher = Matcher(scenario, MatchOptions(tolerance=EXACT, method=method), solver)  # type: ignore[arg-type]
-        for seed in range(3):
-            scene = draw_scene(scenario, random.Random(seed))
-            assert scene is not None
-            drawn = label(*[
-                (*scene.values[n, "position"], scene.values[n, "heading"])  # type: ignore[misc]
-                for n in range(len(scenario.objects))
-            ])  # fmt: skip
-            assert isinstance(matcher.match(drawn), Match), drawn
-            beside = replace(drawn.ego, y=drawn.ego.y + 0.37, heading=drawn.ego.heading + 0.1)  # type: ignore[operator]
-            assert isinstance(matcher.match(replace(drawn, ego=beside)), NoMatch), beside
+    matcher = Matcher(scenario, MatchOptions(tolerance=EXACT, method=method))  # type: ignore[arg-type]
+    for seed in range(3):
+        scene = draw_scene(scenario, random.Random(seed))
+        assert scene is not None
+        drawn = label(*[
+            (*scene.values[n, "position"], scene.values[n, "heading"])  # type: ignore[misc]
+            for n in range(len(scenario.objects))
+        ])  # fmt: skip
+        assert isinstance(matcher.match(drawn), Match), drawn
+        beside = replace(drawn.ego, y=drawn.ego.y + 0.37, heading=drawn.ego.heading + 0.1)  # type: ignore[operator]
+        assert isinstance(matcher.match(replace(drawn, ego=beside)), NoMatch), beside
 
 
 @pytest.mark.parametrize(

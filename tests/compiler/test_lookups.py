@@ -25,7 +25,6 @@ from scenicq.match.options import MatchOptions
 from scenicq.match.search import group_plan
 from scenicq.match.tolerance import EXACT, parse_tolerance
 from scenicq.match.verdict import Match, NoMatch
-from scenicq.smt.solver import open_solver
 from scenicq.store.labels import Label, LabelObject
 
 from .scenes import compiled, network, refused
@@ -91,11 +90,10 @@ def drawn(name: str, seed: int) -> Label:
 
 @pytest.mark.parametrize("name", PROGRAMS)
 def test_a_drawn_scene_matches(name: str) -> None:
-    with open_solver("portable") as solver:
-        matcher = Matcher(scenario(name), MatchOptions(tolerance=EXACT), solver)
-        for seed in range(4):
-            verdict = matcher.match(drawn(name, seed))
-            assert isinstance(verdict, Match), (seed, verdict)
+    matcher = Matcher(scenario(name), MatchOptions(tolerance=EXACT))
+    for seed in range(4):
+        verdict = matcher.match(drawn(name, seed))
+        assert isinstance(verdict, Match), (seed, verdict)
 
 
 IN_LANES: dict[str, tuple[float, float, float]] = {
@@ -133,18 +131,17 @@ def test_a_scene_pushed_out_of_its_element_does_not_match(name: str, where: str,
 
 def test_every_method_gives_the_same_verdict() -> None:
     places = [("Car", x, y, heading) for x, y, heading in IN_LANES.values()]
-    with open_solver("portable") as solver:
-        for name in ("own lane", "other lanes", "same lane", "on through"):
-            for place in places:
-                verdicts = {
-                    type(
-                        Matcher(scenario(name), MatchOptions(tolerance=EXACT, method=method), solver).match(
-                            label([places[0], place])
-                        )
+    for name in ("own lane", "other lanes", "same lane", "on through"):
+        for place in places:
+            verdicts = {
+                type(
+                    Matcher(scenario(name), MatchOptions(tolerance=EXACT, method=method)).match(
+                        label([places[0], place])
                     )
-                    for method in ("auto", "smt", "monolithic")
-                }
-                assert len(verdicts) == 1, (name, place, verdicts)
+                )
+                for method in ("auto", "smt", "monolithic")
+            }
+            assert len(verdicts) == 1, (name, place, verdicts)
 
 
 def pushed(name: str, rng: random.Random) -> Label:

@@ -20,7 +20,6 @@ from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import EXACT, Tolerance
 from scenicq.match.verdict import Match, NoMatch, Unknown, Verdict
-from scenicq.smt.solver import Solver
 from scenicq.store.classes import is_class
 from scenicq.store.labels import Label, LabelObject
 
@@ -122,9 +121,7 @@ def all_match(text: str) -> bool:
     return not (_REFUSED.search(text) or _DIFFERS.search(text))
 
 
-def compare(
-    name: str, text: str, answer: dict[str, Any], network: Network, solver: Solver, version: int | None = None
-) -> Outcome:
+def compare(name: str, text: str, answer: dict[str, Any], network: Network, version: int | None = None) -> Outcome:
     """Match a program of the fixed list with the scenes that Scenic drew from it."""
     outcome = Outcome(name)
     refused = bool(_REFUSED.search(text))
@@ -140,8 +137,8 @@ def compare(
         return outcome
     tolerance = tolerance_of(text)
     sharp, differs = _SHARP.search(text), _DIFFERS.search(text)
-    match_scenes(outcome, scenario, answer["scenes"], tolerance, solver, deviating=bool(differs))
-    matcher = Matcher(scenario, MatchOptions(tolerance=tolerance), solver)
+    match_scenes(outcome, scenario, answer["scenes"], tolerance, deviating=bool(differs))
+    matcher = Matcher(scenario, MatchOptions(tolerance=tolerance))
     for number, scene in enumerate(() if differs else answer["scenes"]):
         for what in sharp[1].split() if sharp else ():
             away = {"far": 3.0} if what == "position" else {"turn": 1.0}
@@ -156,14 +153,11 @@ def match_scenes(
     scenario: Scenario,
     scenes: list[dict[str, Any]],
     tolerance: Tolerance,
-    solver: Solver,
     *,
     deviating: bool = False,
 ) -> None:
     """Match drawn scenes by every set of options."""
-    matchers = {
-        name: Matcher(scenario, replace(options, tolerance=tolerance), solver) for name, options in OPTIONS.items()
-    }
+    matchers = {name: Matcher(scenario, replace(options, tolerance=tolerance)) for name, options in OPTIONS.items()}
     for number, scene in enumerate(scenes):
         label = label_of(scene, number)
         verdicts = {name: matcher.match(label) for name, matcher in matchers.items()}
@@ -184,7 +178,7 @@ def _tell_apart(outcome: Outcome, matcher: Matcher, scene: dict[str, Any], numbe
         outcome.faults.append(f"scene {number}, {what}: {shown(verdict)}")
 
 
-def compare_random(name: str, text: str, answer: dict[str, Any], network: Network, solver: Solver) -> Outcome:
+def compare_random(name: str, text: str, answer: dict[str, Any], network: Network) -> Outcome:
     """Compare what both make of a random program.
 
     It must be refused by both or by none, unless scenicq refuses it with a code of what it does not support. Every
@@ -215,9 +209,9 @@ def compare_random(name: str, text: str, answer: dict[str, Any], network: Networ
         return outcome
     try:
         with patience(PATIENCE_S):
-            match_scenes(outcome, scenario, answer["scenes"], Tolerance(), solver)
+            match_scenes(outcome, scenario, answer["scenes"], Tolerance())
             outcome.kind = "not matched" if outcome.faults else "compared"
-            matcher = Matcher(scenario, MatchOptions(tolerance=EXACT), solver)
+            matcher = Matcher(scenario, MatchOptions(tolerance=EXACT))
             for number, scene in enumerate(() if outcome.faults else answer["scenes"]):
                 for what, moved in _outside(text, scene, number):
                     _tell_apart(outcome, matcher, moved, number, what)

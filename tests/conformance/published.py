@@ -33,7 +33,6 @@ from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import parse_tolerance
 from scenicq.match.verdict import Match, NoMatch
-from scenicq.smt.solver import Solver, open_solver
 from scenicq.store.labels import Label
 
 TOLERANCE = parse_tolerance("position=0.05,heading=0.5deg")
@@ -159,9 +158,7 @@ def changed(scene: dict[str, Any], town: Town, seed: int) -> list[tuple[str, dic
     return found
 
 
-def matched(
-    drawing: Drawing, text: str, kept: dict[str, Any], town: Town, solver: Solver, limit: float, first: int
-) -> Row:
+def matched(drawing: Drawing, text: str, kept: dict[str, Any], town: Town, limit: float, first: int) -> Row:
     """Match what was drawn of a program."""
     row = Row(drawing)
     if not kept.get("scenes"):
@@ -176,7 +173,7 @@ def matched(
         row.said.append(f"not compiled: {error}")
         return row
     row.compiling = time.process_time() - started
-    matcher = Matcher(scenario, MatchOptions(tolerance=TOLERANCE), solver)
+    matcher = Matcher(scenario, MatchOptions(tolerance=TOLERANCE))
     for number, scene in enumerate(kept["scenes"][:first]):
         _match(row, matcher, labelled(scene, town, number, on_roads=2), number, limit)
         for what, moved in changed(scene, town, number):
@@ -238,15 +235,14 @@ def main() -> int:
             print(f"drawn: {drawing.name}: {what}", flush=True)
     rows: list[Row] = []
     print(HEADING)
-    with open_solver("portable") as solver:
-        for name in dict.fromkeys(each.town for each in wanted):
-            town = Town(arguments.work / name / "map.geojson")
-            for drawing in (each for each in wanted if each.town == name and is_drawn(arguments.work, each)):
-                text = (arguments.checkout / drawing.program).read_text(encoding="utf-8")
-                kept = scenes_of(arguments.work, drawing)
-                row = matched(drawing, text, kept, town, solver, arguments.seconds, arguments.scenes)
-                rows.append(row)
-                print(row.line(), *(f"    {line}" for line in row.said), sep="\n", flush=True)
+    for name in dict.fromkeys(each.town for each in wanted):
+        town = Town(arguments.work / name / "map.geojson")
+        for drawing in (each for each in wanted if each.town == name and is_drawn(arguments.work, each)):
+            text = (arguments.checkout / drawing.program).read_text(encoding="utf-8")
+            kept = scenes_of(arguments.work, drawing)
+            row = matched(drawing, text, kept, town, arguments.seconds, arguments.scenes)
+            rows.append(row)
+            print(row.line(), *(f"    {line}" for line in row.said), sep="\n", flush=True)
     times = [each for row in rows for each in row.times]
     counts = {kind: sum(row.verdicts[kind] for row in rows) for kind in ("match", "no", "unknown", "late")}
     print(", ".join(f"{count} {kind}" for kind, count in counts.items()), f"of {len(times)} labels;", end=" ")

@@ -44,7 +44,6 @@ from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import parse_tolerance
 from scenicq.match.verdict import Match, NoMatch, Verdict
-from scenicq.smt.solver import Solver, open_solver
 
 TOWNS = ("Town01", "Town02", "Town05", "Town07", "Town10HD")
 TOLERANCE = parse_tolerance("position=0.05,heading=0.5deg")
@@ -113,7 +112,6 @@ class Judge:
         moves: Whether displaced scenes are decided, too.
     """
 
-    solver: Solver
     moves: bool = True
 
     def findings(self, town: Town, text: str) -> Iterator[Finding]:
@@ -130,7 +128,7 @@ class Judge:
             first = answer["scenes"][0]
             yield Finding(fault.kind, fault.why, first, excuse(text, first, fault.why))
             return
-        matcher = Matcher(scenario, MatchOptions(tolerance=TOLERANCE, timeout_s=CLOCK_S), self.solver)
+        matcher = Matcher(scenario, MatchOptions(tolerance=TOLERANCE, timeout_s=CLOCK_S))
         for number, scene in enumerate(answer["scenes"]):
             found, _ = self.decided(matcher, scene, number)
             found.excuse = "" if found.kind == "right" else excuse(text, scene)
@@ -331,8 +329,8 @@ def main() -> int:
     arguments = parse_arguments()
     python, tally = environment(arguments.environment, SCENIC), Tally()
     print(f"seed {arguments.seed}, programs {arguments.first} to {arguments.first + arguments.programs - 1}")
-    with open_solver("portable") as solver, ExitStack() as stack:
-        good = run(arguments, towns(arguments, python, stack), Judge(solver, arguments.displaced), tally)
+    with ExitStack() as stack:
+        good = run(arguments, towns(arguments, python, stack), Judge(arguments.displaced), tally)
     tally.show()
     return 0 if good else 1
 

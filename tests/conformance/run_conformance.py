@@ -35,7 +35,6 @@ from wrong_lines import WRONG, WRONG_ON_ROADS
 from scenicq.geometry.default_street import street
 from scenicq.geometry.features import read_geojson
 from scenicq.geometry.network import Network
-from scenicq.smt.solver import open_solver
 
 SCENIC = "scenic==3.1.1"
 SCENIC_2 = "scenic==2.1.0"
@@ -126,11 +125,10 @@ class Drawn:
 def fixed(arguments: argparse.Namespace, drawn: Drawn, town: Network) -> Iterator[Outcome]:
     """Compare the programs of the list."""
     paths = sorted(arguments.programs or (HERE / "programs").glob("*.scenic"))
-    with open_solver("portable") as solver:
-        for seed, path in enumerate(paths):
-            text = path.read_text(encoding="utf-8")
-            answer = drawn.answer(path.stem, text, arguments.scenes, seed)
-            yield compare(path.stem, text, answer, on_map(text, town), solver)
+    for seed, path in enumerate(paths):
+        text = path.read_text(encoding="utf-8")
+        answer = drawn.answer(path.stem, text, arguments.scenes, seed)
+        yield compare(path.stem, text, answer, on_map(text, town))
 
 
 def prefilter(arguments: argparse.Namespace, drawn: Drawn, town: Network) -> bool:
@@ -157,44 +155,41 @@ def mistakes(drawn: Drawn, town: Network) -> Iterator[Outcome]:
         ("ego = new Object at (3, -4)", WRONG),
         ("model scenic.domains.driving.model\nego = new Car", WRONG_ON_ROADS),
     )
-    with open_solver("portable") as solver:
-        for start, lines in starts:
-            for number, line in enumerate(lines):
-                text, name = f"{start}\n{line}\n", " ".join(line.split())
-                answer = drawn.answer(f"wrong-{len(lines)}-{number}", text, 1, number)
-                yield compare_random(name, text, answer, on_map(text, town), solver)
+    for start, lines in starts:
+        for number, line in enumerate(lines):
+            text, name = f"{start}\n{line}\n", " ".join(line.split())
+            answer = drawn.answer(f"wrong-{len(lines)}-{number}", text, 1, number)
+            yield compare_random(name, text, answer, on_map(text, town))
 
 
 def earlier(arguments: argparse.Namespace, drawn: Drawn, town: Network) -> Iterator[Outcome]:
     """Compare the programs of Scenic 2: those of its list, and those of Scenic 3 that can be spelled in it."""
     own = sorted((HERE / "programs_2").glob("*.scenic"))
     borrowed = sorted((HERE / "programs").glob("*.scenic"))
-    with open_solver("portable") as solver:
-        for seed, path in enumerate(own + borrowed):
-            text, name = as_scenic_2(path.read_text(encoding="utf-8")), f"2: {path.stem}"
-            answer = drawn.answer(f"{path.parent.name}-{path.stem}", text, arguments.scenes, seed)
-            if path in own or (answer.get("scenes") and not _DEVIATES.search(text)):
-                yield compare(name, text, answer, on_map(text, town), solver, version=2)
+    for seed, path in enumerate(own + borrowed):
+        text, name = as_scenic_2(path.read_text(encoding="utf-8")), f"2: {path.stem}"
+        answer = drawn.answer(f"{path.parent.name}-{path.stem}", text, arguments.scenes, seed)
+        if path in own or (answer.get("scenes") and not _DEVIATES.search(text)):
+            yield compare(name, text, answer, on_map(text, town), version=2)
 
 
 def at_random(arguments: argparse.Namespace, drawn: Drawn, town: Network) -> Iterator[Outcome]:
     """Compare random programs; those that differ are made smaller and kept in the folder of intermediate files."""
-    with open_solver("portable") as solver:
-        for number in range(arguments.first, arguments.first + arguments.random):
-            name = f"random-{arguments.seed}-{number}"
-            text = compose(f"{arguments.seed}/{number}")
+    for number in range(arguments.first, arguments.first + arguments.random):
+        name = f"random-{arguments.seed}-{number}"
+        text = compose(f"{arguments.seed}/{number}")
 
-            def outcome(text: str, name: str = name, number: int = number) -> Outcome:
-                answer = drawn.again(text, RANDOM_SCENES, number)
-                return compare_random(name, text, answer, on_map(text, town), solver)
+        def outcome(text: str, name: str = name, number: int = number) -> Outcome:
+            answer = drawn.again(text, RANDOM_SCENES, number)
+            return compare_random(name, text, answer, on_map(text, town))
 
-            answer = drawn.answer(name, text, RANDOM_SCENES, number, RANDOM_SECONDS)
-            found = compare_random(name, text, answer, on_map(text, town), solver)
-            if found.faults:
-                smaller = shrink(text, _same_fault(found, outcome)) if arguments.shrink else text
-                (arguments.work / f"{name}.scenic").write_text(smaller, encoding="utf-8")
-                found.faults += ["    " + line for line in smaller.splitlines()]
-            yield found
+        answer = drawn.answer(name, text, RANDOM_SCENES, number, RANDOM_SECONDS)
+        found = compare_random(name, text, answer, on_map(text, town))
+        if found.faults:
+            smaller = shrink(text, _same_fault(found, outcome)) if arguments.shrink else text
+            (arguments.work / f"{name}.scenic").write_text(smaller, encoding="utf-8")
+            found.faults += ["    " + line for line in smaller.splitlines()]
+        yield found
 
 
 def distributions(arguments: argparse.Namespace, drawn: Drawn, town: Network) -> bool:

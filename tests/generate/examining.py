@@ -17,7 +17,6 @@ from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import EXACT
 from scenicq.match.verdict import Match, NoMatch
-from scenicq.smt.solver import Solver
 from scenicq.store.labels import Label, LabelObject
 
 ATTEMPTS = 3000
@@ -90,12 +89,12 @@ def _with(label: Label, number: int, thing: LabelObject) -> Label:
     return replace(label, objects=(*label.objects[:number], thing, *label.objects[number + 1 :]))
 
 
-def examine(example: Example, count: int, seed: int, solver: Solver) -> Outcome:
+def examine(example: Example, count: int, seed: int) -> Outcome:
     """Draw labels from a program, match them, push them out."""
     scenario, outcome = example.compiled(), Outcome()
     labels, outcome.waived = drawn_labels(scenario, count, seed)
-    usual = Matcher(scenario, MatchOptions(tolerance=EXACT), solver)
-    strict = Matcher(scenario, MatchOptions(tolerance=EXACT, enforce=frozenset(BuiltIn) - outcome.waived), solver)
+    usual = Matcher(scenario, MatchOptions(tolerance=EXACT))
+    strict = Matcher(scenario, MatchOptions(tolerance=EXACT, enforce=frozenset(BuiltIn) - outcome.waived))
     for number, label in enumerate(labels):
         rng = random.Random(f"{seed}/{number}")
         crowd = shuffled(label, rng)

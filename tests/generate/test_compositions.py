@@ -6,7 +6,6 @@ import math
 import random
 import sys
 from collections import Counter
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -25,16 +24,9 @@ from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import EXACT
 from scenicq.match.verdict import Match, NoMatch
-from scenicq.smt.solver import Solver, open_solver
 from scenicq.store.labels import Label, LabelObject
 
 OPTIONS = MatchOptions(tolerance=EXACT, enforce=frozenset(), timeout_s=5.0)
-
-
-@pytest.fixture(scope="module")
-def solver() -> Iterator[Solver]:
-    with open_solver("portable") as opened:
-        yield opened
 
 
 def composed(seed: int) -> tuple[Composer, Scenario, Scene | None]:
@@ -89,23 +81,23 @@ def test_every_construct_of_the_appendix_is_composed() -> None:
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_a_composed_scene_matches(seed: int, solver: Solver) -> None:
-    assert matched(seed, solver)
+def test_a_composed_scene_matches(seed: int) -> None:
+    assert matched(seed)
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
-def test_composed_scenes_match_but_for_the_hardest(solver: Solver) -> None:
-    found = Counter(matched(seed, solver) for seed in range(12, 200))
+def test_composed_scenes_match_but_for_the_hardest() -> None:
+    found = Counter(matched(seed) for seed in range(12, 200))
     # what is left takes a solver longer than its time; it is never a no
     assert found[False] <= 4, found
 
 
-def matched(seed: int, solver: Solver) -> bool:
+def matched(seed: int) -> bool:
     """Whether a scene of a composed program matches it; never that it does not."""
     _, scenario, scene = composed(seed)
     if scene is None:
         return True  # F is undefined somewhere
-    verdict = Matcher(scenario, OPTIONS, solver).match(label_of(scenario, scene))
+    verdict = Matcher(scenario, OPTIONS).match(label_of(scenario, scene))
     assert not isinstance(verdict, NoMatch), verdict
     return isinstance(verdict, Match)

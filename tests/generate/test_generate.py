@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -13,7 +12,6 @@ from examining import examine
 from examples import Example, examples
 
 from scenicq.errors import ScenarioError
-from scenicq.smt.solver import Solver, open_solver
 
 HANDFUL = [
     "sample:01_pedestrian_facing_ego", "sample:02_crossing_cars", "sample:03_against_traffic",
@@ -35,19 +33,13 @@ NO_SCENES = ("dynamic:", "cookbook-over-time:", "warnings:")
 """Pages of programs about what happens over time, and of programs that cannot be meant."""
 
 
-@pytest.fixture(scope="module")
-def solver() -> Iterator[Solver]:
-    with open_solver("portable") as opened:
-        yield opened
-
-
-def check(example: Example, count: int, solver: Solver) -> None:
+def check(example: Example, count: int) -> None:
     if example.name in NO_SCENE:
         with pytest.raises(ScenarioError) as caught:
-            examine(example, count, 7, solver)
+            examine(example, count, 7)
         assert caught.value.diagnostics[0].code == NO_SCENE[example.name]
         return
-    outcome = examine(example, count, 7, solver)
+    outcome = examine(example, count, 7)
     assert outcome.faults == []
     assert outcome.drawn == outcome.matched == outcome.enforced == count
     assert outcome.excluded == outcome.pushed
@@ -55,11 +47,11 @@ def check(example: Example, count: int, solver: Solver) -> None:
 
 @pytest.mark.parametrize("name", HANDFUL)
 @pytest.mark.one_in(4)
-def test_some_scenes_match_and_do_not_once_they_are_pushed_out(name: str, solver: Solver) -> None:
-    check(examples()[name], 2, solver)
+def test_some_scenes_match_and_do_not_once_they_are_pushed_out(name: str) -> None:
+    check(examples()[name], 2)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in examples() if not name.startswith(NO_SCENES)])
-def test_fifty_scenes_match_and_do_not_once_they_are_pushed_out(name: str, solver: Solver) -> None:
-    check(examples()[name], 50, solver)
+def test_fifty_scenes_match_and_do_not_once_they_are_pushed_out(name: str) -> None:
+    check(examples()[name], 50)

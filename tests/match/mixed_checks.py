@@ -7,8 +7,8 @@ import signal
 import zlib
 
 import bad_checks
+import built_in
 
-from scenicq.smt import portable
 from scenicq.smt.formula import flatten
 
 
@@ -29,4 +29,4 @@ def check(problem, *, precision, timeout_s):
         case 3:
             return bad_checks.eat(problem, precision=precision, timeout_s=timeout_s)
         case _:
-            return portable.check(problem, precision=precision, timeout_s=timeout_s)
+            return built_in.check(problem, precision=precision, timeout_s=timeout_s)

@@ -9,7 +9,6 @@ from scenes import compiled
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.verdict import Match, NoMatch
-from scenicq.smt.solver import open_solver
 from scenicq.store.labels import Label, LabelObject
 
 EGO = LabelObject("ego", "Car", "car", 1.75, 40.0, 0.3, 2.0, 4.0)
@@ -31,10 +30,9 @@ PARENTS: dict[str, tuple[tuple[float, float], float | None]] = {
 def verdicts(text: str, place: tuple[float, float], headings: list[float], method: str = "auto") -> list[type]:
     """What becomes of an object at a place with each heading."""
     kind = "Car" if "Car" in text.splitlines()[-1] else "Object"
-    with open_solver("portable") as solver:
-        matcher = Matcher(compiled(text), MatchOptions(method=method), solver)
-        things = [LabelObject("o", kind, "thing", *place, each, 2.0, 4.0) for each in headings]
-        return [type(matcher.match(Label("f", "r", 0, "street", EGO, (each,)))) for each in things]
+    matcher = Matcher(compiled(text), MatchOptions(method=method))
+    things = [LabelObject("o", kind, "thing", *place, each, 2.0, 4.0) for each in headings]
+    return [type(matcher.match(Label("f", "r", 0, "street", EGO, (each,)))) for each in things]
 
 
 @pytest.mark.parametrize("method", ["auto", "smt"])

@@ -10,7 +10,7 @@ import pytest
 
 from scenicq.errors import SolverError
 from scenicq.geometry.network import Network, read_geojson
-from scenicq.smt.solver import open_solver
+from scenicq.query.execution.lazy_solver import LazySolver
 
 BENCH = Path(__file__).parents[1] / "bench"
 
@@ -43,12 +43,12 @@ def network():
 @pytest.mark.parametrize("name", ["portable", "dreal"])
 @pytest.mark.parametrize("program", jointly.PROGRAMS)
 def test_sampled_labels_match_and_perturbed_ones_do_not(program, name, network):
-    try:
-        opened = open_solver(name)
-    except SolverError as error:
-        pytest.skip(error.diagnostics[0].message)
     scenario = jointly.compiled(jointly.HEADER + jointly.PROGRAMS[program], network)
-    with opened as solver:
+    with LazySolver(name) as solver:
+        try:
+            solver.loads()
+        except SolverError as error:
+            pytest.skip(error.diagnostics[0].message)
         labels = jointly.examples(scenario, 25)
         run, asked = (jointly.decided(scenario, labels, method, solver) for method in jointly.METHODS)
     assert not run.wrong

@@ -23,7 +23,7 @@ from scenicq.match.search import group_cache, group_plan
 from scenicq.match.tolerance import EXACT, Tolerance
 from scenicq.match.verdict import Match, NoMatch, Unknown
 from scenicq.smt.answer import NoAnswer, Sat, Unsat
-from scenicq.smt.pool import WorkerSolver
+from scenicq.smt.worker_solver import WorkerSolver
 from scenicq.store.labels import Label, LabelObject
 
 EGO = LabelObject("ego", "Car", "car", 1.75, 50.0, 0.0, 2.0, 4.5)
@@ -50,9 +50,22 @@ class Fixed:
         self.answer = answer
         self.calls = 0
 
+    def loads(self):
+        return True
+
     def check(self, problem, *, precision, timeout_s):
         self.calls += 1
         return self.answer
+
+
+class Absent(Fixed):
+    """A solver that is not there."""
+
+    def __init__(self):
+        super().__init__(None)
+
+    def loads(self):
+        return False
 
 
 @pytest.mark.parametrize(
@@ -86,8 +99,7 @@ THERE = car("there", 1.75, 57.0)
 @pytest.mark.parametrize("method", ["auto", "smt", "monolithic"])
 def test_a_param_is_compared_where_the_label_has_it(given, expected, method):
     text = "param weather = Uniform('sun', 'rain')\nparam time = 12\nego = new Car"
-    with WorkerSolver() as solver:
-        assert isinstance(verdict(text, frame(**given), solver, method=method), expected)
+    assert isinstance(verdict(text, frame(**given), method=method), expected)
 
 
 def test_a_param_can_be_ignored():
@@ -241,10 +253,12 @@ def test_what_the_solver_does_not_decide_is_unknown_with_its_reason(method, reas
 
 
 @pytest.mark.usefixtures("no_search")
-def test_without_a_solver_it_is_unknown(monkeypatch):
+@pytest.mark.parametrize("solver", [None, Absent()])
+@pytest.mark.parametrize("method", ["auto", "smt", "monolithic"])
+def test_what_the_built_in_solver_leaves_open_is_unknown_where_there_is_no_other(method, solver, monkeypatch):
     # nor is a question made that nobody is asked: for fields at hidden points that takes seconds
     monkeypatch.setattr(solver_step, "encoded", None)
-    assert verdict(NONLINEAR, frame(THERE)).reason == "no solver"
+    assert verdict(NONLINEAR, frame(THERE), solver, method=method).reason == "nonlinear"
 
 
 @pytest.mark.usefixtures("no_search")
@@ -353,7 +367,7 @@ def test_a_worker_that_is_killed_is_replaced(monkeypatch):
         found = Matcher(scenario, MatchOptions(tolerance=EXACT, timeout_s=5.0), solver).match(frame(THERE))
         assert isinstance(found, Unknown)
         assert found.reason == "crash"
-    with WorkerSolver() as solver:
+    with WorkerSolver("built_in:check") as solver:
         assert isinstance(Matcher(scenario, MatchOptions(tolerance=EXACT), solver).match(frame(THERE)), Match)
 
 

@@ -21,12 +21,6 @@ from scenicq.store.classes import class_matches
 METHODS = ("auto", "smt")
 
 
-@pytest.fixture(scope="module")
-def solver():
-    with open_solver("portable") as opened:
-        yield opened
-
-
 def correspondences(scenario, label):
     """Every injective way to give the objects label objects of their class."""
     roles = [thing for thing in scenario.objects if thing.index != scenario.ego]
@@ -35,7 +29,7 @@ def correspondences(scenario, label):
             yield {role.name: each.id for role, each in zip(roles, chosen, strict=True)}
 
 
-def brute_force(scenario, label, solver, options):
+def brute_force(scenario, label, options, solver=None):
     """The verdict of one formula per correspondence, and the correspondences that it allows."""
     matcher = Matcher(scenario, replace(options, method="monolithic"), solver)
     verdicts = [(given, matcher.match(label, given=given)) for given in correspondences(scenario, label)]
@@ -71,7 +65,7 @@ def scopes(scenario, rng):
 SMALL = [name for name in PROGRAMS if name not in ("crowd", "row")]
 
 
-def check_against_brute_force(name, seeds, solver):
+def check_against_brute_force(name, seeds, solver=None):
     scenario = compiled(HEADER + PROGRAMS[name])
     for seed in seeds:
         rng = random.Random(f"{name}-{seed}")
@@ -79,7 +73,7 @@ def check_against_brute_force(name, seeds, solver):
         scoped = scopes(scenario, rng)
         tolerance = rng.choice([EXACT, Tolerance(x=0.25, y=0.25, heading=0.087), Tolerance(position=0.5), scoped])
         options = MatchOptions(tolerance=tolerance, timeout_s=5.0)
-        expected, allowed = brute_force(scenario, label, solver, options)
+        expected, allowed = brute_force(scenario, label, options, solver)
         for method in METHODS:
             matcher = Matcher(scenario, replace(options, method=method), solver)
             verdict = matcher.match(label)
@@ -97,8 +91,8 @@ def check_against_brute_force(name, seeds, solver):
 
 @pytest.mark.parametrize("name", SMALL)
 @pytest.mark.one_in(4)
-def test_brute_force_agrees(name, solver):
-    check_against_brute_force(name, range(3), solver)
+def test_brute_force_agrees(name):
+    check_against_brute_force(name, range(3))
 
 
 @pytest.fixture(scope="module")
@@ -113,8 +107,8 @@ def dreal():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SMALL)
-def test_brute_force_agrees_on_many_labels(name, solver):
-    check_against_brute_force(name, range(3, 14), solver)
+def test_brute_force_agrees_on_many_labels(name):
+    check_against_brute_force(name, range(3, 14))
 
 
 @pytest.mark.slow
@@ -123,7 +117,7 @@ def test_brute_force_agrees_on_many_labels_with_dreal(name, dreal):
     check_against_brute_force(name, range(11), dreal)
 
 
-def test_all_matches_are_all_there_are(solver):
+def test_all_matches_are_all_there_are():
     # no two roles are interchangeable, so that every correspondence is listed
     text = (
         "ego = new Car\nfirst = new Car ahead of ego by Range(1, 60)\nsecond = new Car ahead of first by Range(-60, 60)"
@@ -133,8 +127,8 @@ def test_all_matches_are_all_there_are(solver):
         scene = drawn(scenario, seed)
         label = label_of(scenario, scene, random.Random(seed))
         options = MatchOptions(tolerance=Tolerance(position=20.0, heading=3.14))
-        _, allowed = brute_force(scenario, label, solver, options)
-        found = [dict(match.correspondence) for match in Matcher(scenario, options, solver).matches(label)]
+        _, allowed = brute_force(scenario, label, options)
+        found = [dict(match.correspondence) for match in Matcher(scenario, options).matches(label)]
         without_ego = [{role: thing for role, thing in each.items() if role != "ego"} for each in found]
         assert sorted(map(str, without_ego)) == sorted(map(str, allowed))
 

@@ -14,7 +14,7 @@ import pytest
 from click.testing import CliRunner
 from left_to_solvers import leave_to_solvers
 
-from scenicq.smt import pool, solver
+from scenicq.smt import solver, worker_solver
 from scenicq_cli.main import cli
 
 HERE = Path(__file__).parent
@@ -30,8 +30,8 @@ other = new Car offset along angle relative to ego.heading by (Range(-6, 6), Ran
 
 
 @pytest.fixture(autouse=True, scope="module")
-def no_search():
-    """Nothing of our own decides before a solver is asked."""
+def no_search(honest):
+    """From what is right on, nothing of our own decides before a solver is asked."""
     with pytest.MonkeyPatch.context() as patch:
         leave_to_solvers(patch)
         yield
@@ -67,9 +67,9 @@ def honest(verdicts):
 
 def test_frames_that_a_broken_solver_decides_are_as_ever_and_the_others_are_named(honest, verdicts, monkeypatch):
     monkeypatch.syspath_prepend(str(HERE))
-    monkeypatch.setattr(solver, "PORTABLE", "mixed_checks:check")
-    monkeypatch.setattr(pool, "GRACE_S", 0.05)
-    found = verdicts("--solver", "portable", "--timeout", "0.5")
+    monkeypatch.setattr(solver, "DREAL", "mixed_checks:check")
+    monkeypatch.setattr(worker_solver, "GRACE_S", 0.05)
+    found = verdicts("--solver", "dreal", "--timeout", "0.5")
     assert found.keys() == honest.keys()
     unknown = {frame: reason_of(row) for frame, row in found.items() if row["verdict"] == "unknown"}
     assert all(found[frame]["verdict"] == honest[frame]["verdict"] for frame in found.keys() - unknown.keys())
@@ -106,7 +106,10 @@ def test_a_command_that_misbehaves_leaves_its_frames_unknown(reason, honest, ver
 
 
 @pytest.mark.skipif(not Path("/proc").is_dir(), reason="worker processes are found in /proc")
-def test_workers_killed_from_outside_cost_no_frame_its_verdict_but_those_at_work(honest, verdicts, started_processes):
+def test_workers_killed_from_outside_cost_no_frame_its_verdict_but_those_at_work(
+    honest, verdicts, started_processes, monkeypatch
+):
+    monkeypatch.setattr(solver, "DREAL", "built_in:check")
     done = threading.Event()
     killed, seen, most = [], [], 0
 
@@ -114,7 +117,7 @@ def test_workers_killed_from_outside_cost_no_frame_its_verdict_but_those_at_work
         nonlocal most
         # a solver that is killed at each of three starts does not load, and that is another story
         most = len(killed) + 2
-        return verdicts("--solver", "portable", "--method", "smt")
+        return verdicts("--solver", "dreal", "--method", "smt")
 
     def killer():
         # one as soon as it is seen, that is at its start, the next when it is at work, and so on

@@ -8,7 +8,6 @@ from scenes import compiled
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.verdict import Match, NoMatch
-from scenicq.smt.solver import open_solver
 from scenicq.store.labels import Label, LabelObject
 
 PLACED = {
@@ -35,11 +34,10 @@ def test_its_direction_is_to_the_right(placed, method):
     spot = "spot = new OrientedPoint on PointSetRegion('posts', [(0, 0)])"
     text = f"ego = new Object at (0, 0)\n{spot}\n{placed}\n"
     x, y, heading = PLACED[placed]
-    with open_solver("portable") as solver:
-        matcher = Matcher(compiled(text), MatchOptions(method=method), solver)
-        assert isinstance(matcher.match(label(x, y, heading)), Match)
-        assert isinstance(matcher.match(label(-x - 1, y, heading)), NoMatch)
-        assert isinstance(matcher.match(label(x, y, heading + 1)), NoMatch)
+    matcher = Matcher(compiled(text), MatchOptions(method=method))
+    assert isinstance(matcher.match(label(x, y, heading)), Match)
+    assert isinstance(matcher.match(label(-x - 1, y, heading)), NoMatch)
+    assert isinstance(matcher.match(label(x, y, heading + 1)), NoMatch)
 
 
 @pytest.mark.parametrize(("condition", "holds"), [("(angle to o) < -3", True), ("(angle to o) > 3", False)])

@@ -16,22 +16,15 @@ from scenicq.match.options import MatchOptions
 from scenicq.match.problem.evaluation import replay
 from scenicq.match.tolerance import EXACT, Tolerance
 from scenicq.match.verdict import Match, NoMatch, Unknown
-from scenicq.smt.solver import open_solver
 
 SEEDS = range(6)
 
 
-@pytest.fixture(scope="module")
-def solver():
-    with open_solver("portable") as opened:
-        yield opened
-
-
 @pytest.mark.parametrize("name", PROGRAMS)
 @pytest.mark.one_in(4)
-def test_a_drawn_scene_matches_among_distractors(name, solver):
+def test_a_drawn_scene_matches_among_distractors(name):
     scenario = compiled(HEADER + PROGRAMS[name])
-    matcher = Matcher(scenario, MatchOptions(tolerance=EXACT), solver)
+    matcher = Matcher(scenario, MatchOptions(tolerance=EXACT))
     for seed in SEEDS:
         label = label_of(scenario, drawn(scenario, seed), random.Random(seed), distractors=3)
         verdict = matcher.match(label)
@@ -40,9 +33,9 @@ def test_a_drawn_scene_matches_among_distractors(name, solver):
 
 @pytest.mark.parametrize("name", PROGRAMS)
 @pytest.mark.one_in(4)
-def test_the_witness_of_a_match_satisfies_the_program_in_plain_evaluation(name, solver):
+def test_the_witness_of_a_match_satisfies_the_program_in_plain_evaluation(name):
     scenario = compiled(HEADER + PROGRAMS[name])
-    matcher = Matcher(scenario, MatchOptions(tolerance=EXACT), solver)
+    matcher = Matcher(scenario, MatchOptions(tolerance=EXACT))
     for seed in range(3):
         label = label_of(scenario, drawn(scenario, seed), random.Random(seed), distractors=3)
         found = matcher.examine(label)
@@ -63,7 +56,7 @@ def test_the_witness_of_a_match_satisfies_the_program_in_plain_evaluation(name, 
             ), (seed, group)
 
 
-def test_a_verdict_does_not_hang_on_what_was_matched_before(solver):
+def test_a_verdict_does_not_hang_on_what_was_matched_before():
     for name in list(PROGRAMS)[::3]:
         scenario = compiled(HEADER + PROGRAMS[name])
         labels = []
@@ -71,8 +64,8 @@ def test_a_verdict_does_not_hang_on_what_was_matched_before(solver):
             label = label_of(scenario, drawn(scenario, seed), random.Random(seed), distractors=2)
             moved = tuple(replace(each, x=each.x + 1.0) for each in label.objects)
             labels += [label, replace(label, objects=moved)]
-        alone = [Matcher(scenario, MatchOptions(tolerance=EXACT), solver).match(label) for label in labels]
-        matcher = Matcher(scenario, MatchOptions(tolerance=EXACT), solver)
+        alone = [Matcher(scenario, MatchOptions(tolerance=EXACT)).match(label) for label in labels]
+        matcher = Matcher(scenario, MatchOptions(tolerance=EXACT))
         assert [matcher.match(label) for label in labels] == alone, name
         assert [matcher.match(label) for label in reversed(labels)] == alone[::-1], name
         assert list(matcher.match_all([(label, None) for label in labels])) == alone, name
@@ -80,7 +73,7 @@ def test_a_verdict_does_not_hang_on_what_was_matched_before(solver):
 
 @pytest.mark.parametrize("name", PROGRAMS)
 @pytest.mark.one_in(4)
-def test_every_method_gives_the_same_verdict(name, solver):
+def test_every_method_gives_the_same_verdict(name):
     scenario = compiled(HEADER + PROGRAMS[name])
     seen = set()
     for seed in range(3):
@@ -93,7 +86,7 @@ def test_every_method_gives_the_same_verdict(name, solver):
             moved[victim] = replace(moved[victim], x=moved[victim].x + off, heading=moved[victim].heading + off / 4)
         for each in (label, replace(label, objects=tuple(moved))):
             verdicts = {
-                method: type(Matcher(scenario, MatchOptions(tolerance=EXACT, method=method), solver).match(each))
+                method: type(Matcher(scenario, MatchOptions(tolerance=EXACT, method=method)).match(each))
                 for method in ("auto", "smt", "monolithic")
             }
             decided = {verdict for verdict in verdicts.values() if verdict is not Unknown}
@@ -125,7 +118,7 @@ PERTURBED: dict[str, tuple[str, str, float]] = {
 
 
 @pytest.mark.parametrize("name", PERTURBED)
-def test_a_scene_pushed_out_of_the_support_does_not_match(name, solver):
+def test_a_scene_pushed_out_of_the_support_does_not_match(name):
     import math
 
     scenario = compiled(HEADER + PROGRAMS[name])
@@ -141,7 +134,7 @@ def test_a_scene_pushed_out_of_the_support_does_not_match(name, solver):
         values[index, "position"] = (x + right * c - ahead * s, y + right * s + ahead * c)
         values[index, "heading"] = heading + (far if what == "heading" else 0.0)
         label = label_of(scenario, replace(scene, values=values), random.Random(seed))
-        verdict = Matcher(scenario, MatchOptions(tolerance=EXACT), solver).match(label)
+        verdict = Matcher(scenario, MatchOptions(tolerance=EXACT)).match(label)
         assert isinstance(verdict, NoMatch), (seed, verdict)
 
 

@@ -108,6 +108,9 @@ class _Slow:
     def __init__(self) -> None:
         self.given: list[float] = []
 
+    def loads(self) -> bool:
+        return True
+
     def check(self, problem: object, *, precision: float, timeout_s: float) -> Sat | Unsat:
         self.given.append(timeout_s)
         return Unsat()

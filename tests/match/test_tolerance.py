@@ -16,7 +16,6 @@ from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import EXACT, SLACK, Margin, Tolerance, parse_tolerance
 from scenicq.match.verdict import Match, NoMatch
-from scenicq.smt.solver import open_solver
 from scenicq.store.labels import Label, LabelObject
 
 PEOPLE = (
@@ -29,12 +28,6 @@ PEOPLE = (
 @pytest.fixture(scope="module")
 def people():
     return compiled(PEOPLE)
-
-
-@pytest.fixture(scope="module")
-def solver():
-    with open_solver("portable") as opened:
-        yield opened
 
 
 def test_the_default_is_that_of_the_query_paper_and_exact_is_for_generated_labels():
@@ -143,10 +136,10 @@ def test_a_tolerance_is_shown_rounded_up(tolerance, text):
     [("lead", {"Car"}), ("person", {"Pedestrian"}), ("Pedestrian", {"Pedestrian"}), ("Object", {"Car", "Pedestrian"})],
 )
 @pytest.mark.parametrize("method", ["auto", "smt", "monolithic"])
-def test_a_displaced_object_matches_within_its_own_scope_only(people, solver, method, scope, tolerant):
+def test_a_displaced_object_matches_within_its_own_scope_only(people, method, scope, tolerant):
     label = label_of(people, drawn(people, 1), random.Random(1))
     tolerance = parse_tolerance(f"exact,{scope}.position=1")
-    matcher = Matcher(people, MatchOptions(tolerance=tolerance, method=method), solver)
+    matcher = Matcher(people, MatchOptions(tolerance=tolerance, method=method))
     for victim in label.objects:
         moved = [replace(each, x=each.x + 0.6) if each is victim else each for each in label.objects]
         verdict = matcher.match(replace(label, objects=tuple(moved)))

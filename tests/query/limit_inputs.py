@@ -17,6 +17,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "temporal"))
 sys.path.insert(0, str(Path(__file__).parents[1] / "match"))
 sys.path.insert(0, str(Path(__file__).parents[1] / "match/fields"))
+import built_in
 import pytest
 from choices_definition import alike, random_program, random_trace
 from choices_definition import recording_of as recording_of_trace
@@ -48,7 +49,6 @@ from scenicq.query.explain.frame_explanation import explain, show_explanation
 from scenicq.query.explain.interval_explanation import explain_recording
 from scenicq.query.explain.nearest_interval import nearest_intervals
 from scenicq.query.explain.nearest_miss import nearest_misses
-from scenicq.smt import portable
 from scenicq.smt.answer import Answer, NoAnswer, Sat
 from scenicq.smt.case_split import check_by_cases
 from scenicq.smt.command import SmtlibSolver
@@ -56,7 +56,6 @@ from scenicq.smt.distance_terms import BoxTerms
 from scenicq.smt.enclosing import box_holds
 from scenicq.smt.formula import (
     Disjunction,
-    Formula,
     Num,
     Operator,
     Problem,
@@ -64,11 +63,10 @@ from scenicq.smt.formula import (
     Variable,
     apply,
     compare,
-    conjunction,
     disjunction,
 )
-from scenicq.smt.pool import WorkerSolver
 from scenicq.smt.region_membership import UnsupportedError
+from scenicq.smt.worker_solver import WorkerSolver
 from scenicq.store.dataset import Dataset, open_dataset
 from scenicq.store.labels import Label, LabelObject, Recording
 from scenicq.store.writer import write_dataset
@@ -271,22 +269,18 @@ def fact(answer: Answer) -> Facts:
     return {("question",): said} if said else {}
 
 
-def question(stores: Stores, formula: Formula, variables: tuple[Variable, ...], **_: object) -> Facts:
-    """A question to the portable solver, in this process."""
-    answer = portable.check(Problem(variables, formula), precision=1e-3, timeout_s=5.0)
-    return (
-        {("question",): "match" if isinstance(answer, Sat) else "unknown"} if isinstance(answer, Sat | NoAnswer) else {}
-    )
-
-
 class Lost:
     """A solver that is lost where there are alternatives."""
+
+    def loads(self) -> bool:
+        """It is there."""
+        return True
 
     def check(self, problem: Problem, *, precision: float, timeout_s: float) -> Answer:
         """Decide a problem."""
         if isinstance(problem.constraint, Disjunction):
             return NoAnswer("budget")
-        return portable.check(problem, precision=precision, timeout_s=timeout_s)
+        return built_in.check(problem, precision=precision, timeout_s=timeout_s)
 
 
 def by_cases(stores: Stores, **_: object) -> Facts:
@@ -303,12 +297,12 @@ def held_box(stores: Stores, **_: object) -> Facts:
         formula = box_holds(terms, region, ((0.0, 9.0), (2.0, 2.0)))
     except UnsupportedError:
         return fact(NoAnswer("unsupported"))
-    return fact(portable.check(Problem((X,), formula), precision=1e-3, timeout_s=5.0))
+    return fact(built_in.check(Problem((X,), formula), precision=1e-3, timeout_s=5.0))
 
 
 def worker(stores: Stores, **_: object) -> Facts:
-    """A question to the portable solver in a process of its own."""
-    with WorkerSolver("scenicq.smt.portable:check") as solver:
+    """A question to a solver in a process of its own."""
+    with WorkerSolver("built_in:check") as solver:
         answer = solver.check(Problem((X,), compare("<", Var("x"), Num(0.5))), precision=1e-3, timeout_s=20.0)
     return (
         {("question",): "match" if isinstance(answer, Sat) else "unknown"} if isinstance(answer, Sat | NoAnswer) else {}
@@ -379,25 +373,7 @@ def drawn(stores: Stores, **_: object) -> Facts:
     return told(found)
 
 
-X, Y = Variable("x", 0.0, 1.0), Variable("y", 0.0, 1.0)
-CIRCLE = conjunction(
-    [
-        compare("==", apply(Operator.ADD, *(apply(Operator.POW, Var(n), Num(2.0)) for n in "xy")), Num(0.5)),
-        compare("==", apply(Operator.SIN, apply(Operator.MUL, Num(9.0), Var("x"))), apply(Operator.COS, Var("y"))),
-    ]
-)
-NESTED = disjunction(
-    [
-        compare("<", Var("x"), Num(-1.0)),
-        conjunction(
-            [
-                compare("<", Num(0.5), Var("x")),
-                disjunction([compare("<", Var("y"), Num(-1.0)), compare("<", Num(0.2), Var("y"))]),
-            ]
-        ),
-    ]
-)
-FAR = compare("==", apply(Operator.SIN, Var("z")), Num(0.5))
+X = Variable("x", 0.0, 1.0)
 
 TOO_CLOSE = (
     "ego = new Car on road\nwalker = new Pedestrian on sidewalk, facing Range(0, 360) deg\n"
@@ -409,11 +385,12 @@ INPUTS: Mapping[str, Callable[..., Facts]] = {
     **{f"frames: {name}": functools.partial(answers, store=name, text=PROGRAMS[name]) for name in FRAMES},
     **{f"frames: {name}": functools.partial(answers, store=name, text=text) for name, text in EXTRA.items()},
     **{
-        f"solver: {name}": functools.partial(answers, store=name, text=PROGRAMS[name], method="smt")
+        f"{who}: {name}": functools.partial(answers, store=name, text=PROGRAMS[name], method="smt", solver=solver)
         for name in BY_SOLVER
+        for who, solver in (("built in", "portable"), ("solver", "dreal"))
     },
     **{
-        f"solver: {name}": functools.partial(answers, store=name, text=EXTRA[name], method="smt")
+        f"solver: {name}": functools.partial(answers, store=name, text=EXTRA[name], method="smt", solver="dreal")
         for name in ("whole numbers", "many whole numbers", "near the curb", "rounded", "crossing spot")
     },
     **{
@@ -421,7 +398,7 @@ INPUTS: Mapping[str, Callable[..., Facts]] = {
         for name in ("figure 3", "crowd", "row")
     },
     **{f"time: {n}": functools.partial(answers, store="time", text=text) for n, text in over_time().items()},
-    "time, solver: 1": functools.partial(answers, store="time", text=over_time()[1], method="smt"),
+    "time, solver: 1": functools.partial(answers, store="time", text=over_time()[1], method="smt", solver="dreal"),
     **{
         f"roads: {name}": functools.partial(answers, store="crossroads", text="ego = new Car\n" + text)
         for name, text in OVER_TIME_ON_ROADS.items()
@@ -435,11 +412,8 @@ INPUTS: Mapping[str, Callable[..., Facts]] = {
         prefilter=False,
     ),
     **{f"language: {name}": functools.partial(compiled, text=text) for name, text in LANGUAGE.items()},
-    "question: nested": functools.partial(question, formula=NESTED, variables=(X, Y)),
-    "question: circle": functools.partial(question, formula=CIRCLE, variables=(X, Y)),
     "question: cases": by_cases,
     "question: box": held_box,
-    "question: far": functools.partial(question, formula=FAR, variables=(Variable("z", 1e3, float("inf")),)),
     "worker": worker,
     "command": command,
     "fields": about_fields,

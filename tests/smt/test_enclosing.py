@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
+from built_in import check
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import Polygon
@@ -28,7 +29,6 @@ from scenicq.smt.distance_terms import BoxTerms
 from scenicq.smt.enclosing import box_holds
 from scenicq.smt.evaluation import evaluate
 from scenicq.smt.formula import Num, Problem, Var, Variable, negation
-from scenicq.smt.portable import check
 from scenicq.smt.region_membership import UnsupportedError
 
 ELL = Polygon([(0, 0), (12, 0), (12, 5), (5, 5), (5, 12), (0, 12)])

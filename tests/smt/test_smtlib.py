@@ -150,19 +150,6 @@ def test_commands(tmp_path: Path, body: str, answer: Answer) -> None:
         assert solver.check(problem, precision=1e-3, timeout_s=1.0 if answer == NoAnswer("timeout") else 20.0) == answer
 
 
-def test_commands_run_side_by_side(tmp_path: Path) -> None:
-    # each answers only when all four are there
-    here = tmp_path / "here"
-    here.mkdir()
-    body = (
-        f"import os, time; open(os.path.join({str(here)!r}, str(os.getpid())), 'w').close()\n"
-        f"while len(os.listdir({str(here)!r})) < 4: time.sleep(0.01)\n"
-        "print('unsat')"
-    )
-    with SmtlibSolver(_stub(tmp_path, body), jobs=4) as solver:
-        assert solver.check_many([ONE] * 4, precision=1e-3, timeout_s=60.0) == [Unsat()] * 4
-
-
 @pytest.mark.parametrize("command", ["no-such-solver -in", "", "'unclosed", "/"])
 def test_commands_that_cannot_start(command: str) -> None:
     with pytest.raises(SolverError):

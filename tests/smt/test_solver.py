@@ -22,18 +22,23 @@ def without_dreal(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "DREAL", "no_such_package:check")
 
 
-@pytest.mark.parametrize("name", ["auto", "portable"])
-def test_names(name: str) -> None:
-    with open_solver(name) as opened:
-        assert opened.name in ("dreal", "portable")
+def test_the_built_in_solver_is_none_of_them() -> None:
+    assert open_solver("portable") is None
+
+
+def test_auto_is_dreal_where_it_loads(monkeypatch: pytest.MonkeyPatch) -> None:
+    # this one loads everywhere, in a process of its own as dReal would
+    monkeypatch.setattr(module, "DREAL", "built_in:check")
+    opened = open_solver("auto")
+    assert opened is not None
+    with opened:
+        assert opened.loads()
         assert isinstance(opened.check(PROBLEM, precision=1e-3, timeout_s=20.0), Sat)
 
 
 @pytest.mark.usefixtures("without_dreal")
-def test_auto_falls_back() -> None:
-    with open_solver("auto") as opened:
-        assert opened.name == "portable"
-        assert isinstance(opened.check(PROBLEM, precision=1e-3, timeout_s=20.0), Sat)
+def test_auto_is_the_built_in_solver_where_dreal_does_not_load() -> None:
+    assert open_solver("auto") is None
 
 
 @pytest.mark.usefixtures("without_dreal")
@@ -80,5 +85,5 @@ def test_opening_imports_no_solver() -> None:
     script = "import sys; import scenicq.smt.solver; print(*sys.modules)"
     run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     loaded = set(run.stdout.split())
-    assert "scenicq.smt.pool" in loaded
-    assert not loaded & {"dreal", "codac", "numpy", "scenicq.smt.dreal", "scenicq.smt.portable"}
+    assert "scenicq.smt.worker_solver" in loaded
+    assert not loaded & {"dreal", "codac", "numpy", "scenicq.smt.dreal"}

@@ -1,10 +1,14 @@
-"""Groups put to a solver, and its answer checked: the last step of the cascade."""
+"""Groups put to a solver: the last step of the cascade.
+
+The built-in solver is branch and prune over boxes (`fields/branch_and_prune`). Another one is asked a formula, and its
+witness is checked.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from scenicq.budget import waiting
 from scenicq.forest.groups import Comparison, Constraint
@@ -20,9 +24,17 @@ if TYPE_CHECKING:  # takes long to load, and most queries ask no solver
     from scenicq.smt.answer import Solver
     from scenicq.smt.encode import Encoding, Target
 
-__all__ = ["ask", "discrete_options", "encoded"]
+__all__ = ["AskSolver", "ask", "discrete_options", "encoded"]
 
 _REFINED = 100.0
+
+
+class AskSolver(Protocol):
+    """Has groups decided together by a solver."""
+
+    def __call__(self, items: Sequence[Sequence[Item]], doubt: Undecided | None = None) -> Outcome:
+        """Decide groups; arguments as of `ask`."""
+        ...
 
 
 def encoded(items: Sequence[Sequence[Item]], options: MatchOptions, *, borders: bool = True) -> Encoding:
@@ -42,16 +54,28 @@ def encoded(items: Sequence[Sequence[Item]], options: MatchOptions, *, borders: 
     return encode(targets, borders=borders)
 
 
-def ask(items: Sequence[Sequence[Item]], options: MatchOptions, solver: Solver | None) -> Outcome:
-    """Decide groups together by a solver, for one outcome of their discrete variables after the other.
+def ask(
+    items: Sequence[Sequence[Item]], options: MatchOptions, solver: Solver | None, doubt: Undecided | None = None
+) -> Outcome:
+    """Decide groups together by a solver.
 
     Args:
         items: The groups after conditioning.
         options: The options.
-        solver: The solver, if there is one.
+        solver: The solver; None for the built-in one, which also decides where the solver does not load.
+        doubt: What the built-in solver has left undecided, if it was asked.
     """
+    if solver is None or not solver.loads():
+        from scenicq.match.fields.branch_and_prune import branch_and_prune  # noqa: PLC0415 - takes long to load
+
+        return doubt or branch_and_prune([item for group in items for item in group], options.tolerance)
+    return _ask_for_each(items, options, solver)
+
+
+def _ask_for_each(items: Sequence[Sequence[Item]], options: MatchOptions, solver: Solver) -> Outcome:
+    """Ask for one outcome of the discrete variables after the other, if there are few."""
     known = discrete_options([node for group in items for _, node, _ in group])
-    if solver is None or not known or math.prod(len(numbers) for _, numbers in known) > LIMITS.asked_outcomes:
+    if not known or math.prod(len(numbers) for _, numbers in known) > LIMITS.asked_outcomes:
         return _ask_once(items, options, solver)
     blamed: Outcome = Refuted(next(constraint for group in items for constraint, _, _ in group))
     todo: list[tuple[Sequence[Sequence[Item]], dict[Identity, Value]]] = [(items, {})]
@@ -89,12 +113,10 @@ def discrete_options(roots: Sequence[Node]) -> list[tuple[Leaf, range]]:
     return [(leaf, options) for leaf, options in found if options is not None]
 
 
-def _ask_once(items: Sequence[Sequence[Item]], options: MatchOptions, solver: Solver | None) -> Outcome:
+def _ask_once(items: Sequence[Sequence[Item]], options: MatchOptions, solver: Solver) -> Outcome:
     """Decide groups by one question; a witness that does not replay is repaired, refined, then given up."""
     flat = [item for group in items for item in group]
     blame = flat[0][0]
-    if solver is None:
-        return Undecided(blame, "no solver")  # without encoding: cells of fields take seconds
     from scenicq.match.fields.field_solver import repaired  # noqa: PLC0415 - these take long to load
     from scenicq.smt.answer import NoAnswer, Sat, Unsat  # noqa: PLC0415
     from scenicq.smt.case_split import check_by_cases  # noqa: PLC0415

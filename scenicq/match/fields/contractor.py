@@ -6,7 +6,7 @@ whatever the expressions are made of. The bounds are never too narrow: a case of
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import cast
 
@@ -31,6 +31,8 @@ from scenicq.forest.nodes import (
     Identity,
     Intersects,
     Leaf,
+    Logic,
+    LogicOp,
     Node,
     Norm,
     PointIn,
@@ -68,6 +70,7 @@ from scenicq.match.fields.interval_domain import (
 )
 from scenicq.match.fields.interval_functions import PARTIAL, arguments_of, range_of
 from scenicq.match.fields.region_bounds import distance_between, places_of
+from scenicq.match.fields.region_conditions import RegionCondition, may_be
 from scenicq.match.problem.conditioned import Item
 from scenicq.match.tolerance import ROUNDING, SLACK
 
@@ -271,10 +274,10 @@ class BoxSet:
     def _select(self, node: Select) -> Enclosure | None:
         options = [self._bounds.get(id(option)) for option in node.options]
         known = [option for option in options if option is not None]
-        if len(known) < len(options) or len({option.ndim for option in known}) > 1:
-            return None
-        stacked = np.stack(known)
         chosen = self.chosen.get(id(node.index))
+        if len({option.ndim for option in known}) != 1 or (chosen is None and len(known) < len(options)):
+            return None
+        stacked = np.stack([everything(known[0]) if option is None else option for option in options])
         if chosen is not None:
             return np.take_along_axis(stacked, chosen.astype(int).reshape((1,) * (stacked.ndim - 1) + (-1,)), axis=0)[0]
         return np.stack([stacked[..., 0, :].min(axis=0), stacked[..., 1, :].max(axis=0)], axis=-2)
@@ -284,25 +287,36 @@ class BoxSet:
     def _compare(self, item: Item) -> None:
         constraint, node, seen = item
         if not isinstance(constraint, Comparison):
-            todo = [(node, np.ones(self.size, dtype=bool))]
-            while todo:
-                whole, where = todo.pop()
-                for part in conjuncts(whole):
-                    chosen = self.chosen.get(id(part.index)) if isinstance(part, Select) else None
-                    if isinstance(part, Select) and chosen is not None:
-                        todo += [(option, where & (chosen == number)) for number, option in enumerate(part.options)]
-                    else:
-                        self._hold(part, where)
-        elif isinstance(seen, tuple) and constraint.property == "position":
-            margin = self.network.tolerance.of(constraint.object, "position")
+            for part, where in self._chosen_parts(node, conjuncts):
+                self._hold(part, where)
+            return
+        margin = self.network.tolerance.of(constraint.object, constraint.property)
+        for part, where in self._chosen_parts(node, lambda whole: (whole,)):
+            if isinstance(part, Constant) and not margin.allows(part.value, seen, SLACK):
+                self._refuse(where)
+        if isinstance(seen, tuple) and constraint.property == "position":
             a, b = margin.size + SLACK, margin.y + SLACK
             off = np.array([[[-a], [a]], [[-b], [b]]])
             self._meet(node, np.array(seen, dtype=float)[:, None, None] + off)
         elif id(node) in self.network.headings:
             self._meet(node, turns_near(self.network.headings[id(node)], self._scalar(node)))
         elif isinstance(seen, float):
-            allowed = self.network.tolerance.of(constraint.object, constraint.property).size + SLACK
+            allowed = margin.size + SLACK
             self._meet(node, np.array([[seen - allowed], [seen + allowed]]))
+
+    def _chosen_parts(
+        self, root: Node, split: Callable[[Node], Iterable[Node]]
+    ) -> Iterator[tuple[Node, NDArray[np.bool_]]]:
+        """What an expression, split, comes to as its choices have been made, and in which cases, (n,)."""
+        todo = [(root, np.ones(self.size, dtype=bool))]
+        while todo:
+            whole, where = todo.pop()
+            for part in split(whole):
+                chosen = self.chosen.get(id(part.index)) if isinstance(part, Select) else None
+                if isinstance(part, Select) and chosen is not None:
+                    todo += [(option, where & (chosen == number)) for number, option in enumerate(part.options)]
+                else:
+                    yield part, where
 
     def _hold(self, node: Node, where: NDArray[np.bool_]) -> None:
         """Have a condition hold in some of the cases, (n,)."""
@@ -318,10 +332,13 @@ class BoxSet:
                 if node.op in (CompareOp.GT, CompareOp.GE, CompareOp.EQ):
                     self._order(node.right, right, node.left, left, where)
             case Constant(value=False | Undefined()):
-                self._refuse(node, where)
+                self._refuse(where)
             case Contains() | Intersects() | Encloses():
                 for point, place in places_of(node, self._vector, self._scalar):
                     self._meet(point, np.where(where, place, everything(place)))
+                self._refuse_unless(node, True, where)
+            case Logic(op=LogicOp.NOT, args=(Contains() | Intersects() | Encloses() as inner,)):
+                self._refuse_unless(inner, False, where)
             case _:
                 pass
 
@@ -330,9 +347,17 @@ class BoxSet:
         self._meet(below, np.stack([np.full(self.size, -np.inf), np.where(where, high[1], np.inf)]))
         self._meet(above, np.stack([np.where(where, low[0], -np.inf), np.full(self.size, np.inf)]))
 
-    def _refuse(self, node: Node, where: NDArray[np.bool_]) -> None:
-        """Have nothing left in some of the cases."""
-        self._meet(node, np.where(where, [[np.inf], [-np.inf]], [[-np.inf], [np.inf]]))
+    def _refuse_unless(self, node: RegionCondition, wanted: bool, where: NDArray[np.bool_]) -> None:
+        """Have nothing left where a condition on regions is never what it should be."""
+        possible = may_be(node, wanted, self._vector, self._scalar)
+        if possible is not None:
+            self._refuse(where & ~possible)
+
+    def _refuse(self, where: NDArray[np.bool_]) -> None:
+        """Have nothing left in some of the cases: no number is in no bounds, whatever the nodes are."""
+        bounds = np.where(where, [[np.inf], [-np.inf]], [[-np.inf], [np.inf]])
+        known = self._bounds.get(id(self.network))
+        self._bounds[id(self.network)] = bounds if known is None else common(known, bounds)
 
     def _backward(self, node: Node) -> None:
         own = self._bounds.get(id(node))

@@ -20,7 +20,8 @@ from scenicq.forest.walk import leaves
 from scenicq.geometry import shapes
 from scenicq.geometry.fields import VectorField
 from scenicq.geometry.occupancy import ElementAtPoint
-from scenicq.geometry.regions import SLACK, PointSet, PolygonSet, PolylineSet
+from scenicq.geometry.proximity import meets_many
+from scenicq.geometry.regions import Region
 from scenicq.limits import LIMITS, exhausted
 from scenicq.match.fields.cell_assignment import MARGIN, SAME
 from scenicq.match.fields.contractor import BoxSet
@@ -179,7 +180,7 @@ def _placed(cases: BoxSet) -> BoxSet:
     """The cases in which random points can lie in their regions, of which narrowing knows the bounds alone."""
     for identity, leaf in cases.network.leaves.items():
         region = leaf.region.value if isinstance(leaf, PointIn) and isinstance(leaf.region, Constant) else None
-        if not (isinstance(region, PolygonSet | PolylineSet | PointSet) and cases.size):
+        if not (isinstance(region, Region) and cases.size):
             continue
         place = cases.ranges[identity]
         size = np.hypot(*(place[:, 1] - place[:, 0]))
@@ -187,8 +188,7 @@ def _placed(cases: BoxSet) -> BoxSet:
         if not np.isfinite(size).all() or (size > _WORTH * before).all():
             continue
         boxes = np.concatenate([place[:, 0] - MARGIN, place[:, 1] + MARGIN]).T
-        held = np.zeros(cases.size, dtype=bool)
-        held[shapes.tree_pairs_within(region.tree, shapes.boxes(boxes), SLACK)[0]] = True
+        held = meets_many(region, shapes.boxes(boxes), np.zeros(cases.size))
         cases = cases.take(np.nonzero(held)[0])
         cases.asked[id(identity)] = size[held]
     return cases

@@ -19,7 +19,7 @@ from scenicq.match.fields import interval_domain as domain
 from scenicq.match.fields.interval_domain import Enclosure
 from scenicq.match.tolerance import SLACK
 
-__all__ = ["distance_between", "places_of"]
+__all__ = ["Bounds", "distance_between", "known_region", "middles", "places_of"]
 
 Bounds = Callable[[Node], Enclosure]
 """What is known of a node so far."""
@@ -35,10 +35,10 @@ def distance_between(region: Node, place: Enclosure) -> Enclosure:
         place: Where the points can be, (2, 2, n).
     """
     found = np.stack([np.zeros(place.shape[-1]), np.full(place.shape[-1], np.inf)])
-    known = _known(region)
+    known = known_region(region)
     if known is None:
         return found
-    middle, reach = _disc_around(place)
+    middle, reach = middles(place)
     near = np.nonzero(np.isfinite(reach))[0]
     try:
         away = distance_many(known, middle[:, near].T)
@@ -72,7 +72,7 @@ def places_of(
             continue
         place = vector(point)
         own = np.zeros((2, place.shape[-1])) if other is None else _radius(other, scalar)
-        known, center = _known(region), _center(region)
+        known, center = known_region(region), _center(region)
         if known is not None:
             yield point, _within(known, place, own[1] + SLACK)
         elif center is not None:
@@ -87,7 +87,7 @@ def _within(region: Region, place: Enclosure, reach: NDArray[np.float64]) -> Enc
     """The points within some metres of a region."""
     west, south, east, north = bounds(region)
     box = np.array([[west, east], [south, north]])[..., None] + np.stack([-reach, reach])
-    middle, around = _disc_around(place)
+    middle, around = middles(place)
     asked = np.nonzero(np.isfinite(around) & np.isfinite(reach))[0]
     if len(asked):
         # one reach for all is enough: boxes that are narrowed together are alike
@@ -98,7 +98,7 @@ def _within(region: Region, place: Enclosure, reach: NDArray[np.float64]) -> Enc
     return box
 
 
-def _disc_around(place: Enclosure) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def middles(place: Enclosure) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """The middles (2, n) of boxes, and how far a point of them can be from there; infinite where nothing is known."""
     finite = np.isfinite(place).all(axis=(0, 1))
     safe = np.where(finite, place, 0.0)
@@ -107,7 +107,8 @@ def _disc_around(place: Enclosure) -> tuple[NDArray[np.float64], NDArray[np.floa
     return middle, np.where(finite, reach, np.inf)
 
 
-def _known(region: Node) -> Region | None:
+def known_region(region: Node) -> Region | None:
+    """The region that an expression is, if it is known."""
     value = region.value if isinstance(region, Constant) else None
     return value if isinstance(value, Region) else None
 

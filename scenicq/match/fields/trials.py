@@ -128,7 +128,7 @@ class TrialSpace:
         self.fields = [node for node, _ in self._steps if isinstance(node, DirectionAt)]
         self._use = {id(node): number for number, node in enumerate(self.fields)}
         self._only_below: dict[int, list[tuple[int, int]]] = {}
-        for select in [node for node, _ in self._steps if isinstance(node, Select)]:
+        for select in [node for node, _ in self._steps if isinstance(node, Select) and self.fields]:
             if isinstance(select.index, Index) and any(not isinstance(option, Constant) for option in select.options):
                 row = self.hidden[select.index.identity].rows.start
                 for number in range(len(select.options)):

@@ -16,6 +16,7 @@ from scenicq.forest.groups import PARAMS, Group
 from scenicq.forest.nodes import Value
 from scenicq.limits import LIMITS
 from scenicq.match.decide.decomposition import chooses_apart, search_decomposed
+from scenicq.match.decide.solver_step import AskSolver
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import LabelProblem
 from scenicq.match.problem.conditioned import Item, LabelNodes, uses_field
@@ -47,7 +48,7 @@ class GroupCache:
 
     options: MatchOptions
     problem: LabelProblem
-    ask: Ask
+    ask: AskSolver
     lookups: MapLookups
     trials: Trials = field(default_factory=lambda: Trials(LIMITS.witness_trials))
     patience: Patience = Patience.ALL
@@ -143,7 +144,7 @@ class GroupCache:
     def _at_last(self, items: Sequence[Sequence[Item]]) -> Steps:
         """What nothing else decides: branch and prune, then the solver."""
         found = yield from self._searched(items)
-        return self.ask(items) if isinstance(found, Undecided) else found
+        return self.ask(items, found) if isinstance(found, Undecided) else found
 
 
 def translated(decided: tuple[Group, Outcome], target: Group) -> Outcome:

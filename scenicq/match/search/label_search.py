@@ -16,6 +16,7 @@ from scenicq.forest.groups import Constraint, Group
 from scenicq.forest.scenario import Scenario
 from scenicq.limits import LIMITS
 from scenicq.match.decide.decomposition import search_decomposed
+from scenicq.match.decide.solver_step import AskSolver
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.bipartite_matching import Slot
 from scenicq.match.problem.candidates import LabelProblem
@@ -25,7 +26,6 @@ from scenicq.match.problem.outcome import Outcome, Patience, Refuted, Satisfied,
 from scenicq.match.problem.symmetry import in_one_order
 from scenicq.match.search.arc_consistency import arc_consistent
 from scenicq.match.search.backtracking import Consistency, Reporter, find_assignments
-from scenicq.match.search.choice_search import Ask
 from scenicq.match.search.group_cache import GroupCache, known_of, surely, translated
 from scenicq.match.search.group_plan import GroupPlan, MatchPlan
 
@@ -89,7 +89,7 @@ class LabelSearch:
     scenario: Scenario
     options: MatchOptions
     problem: LabelProblem
-    ask: Ask
+    ask: AskSolver
     reporter: Reporter | None = None
     lookups: MapLookups = field(default_factory=MapLookups)
     failure: Failure | None = None

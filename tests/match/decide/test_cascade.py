@@ -28,7 +28,6 @@ from scenicq.match.options import MatchOptions
 from scenicq.match.problem.evaluation import replay
 from scenicq.match.problem.outcome import Refuted, Satisfied, Undecided
 from scenicq.match.tolerance import EXACT, Tolerance
-from scenicq.smt.solver import open_solver
 
 small = st.floats(-20, 20).map(lambda x: round(x, 2))
 angles = st.floats(-7, 7).map(lambda x: round(x, 2))
@@ -136,15 +135,9 @@ OUTSIDE = {
 }
 
 
-@pytest.fixture(scope="module")
-def solver():
-    with open_solver("portable") as opened:
-        yield opened
-
-
 @pytest.mark.parametrize("kind", REGIONS)
 @pytest.mark.parametrize("shared", [False, True])
-def test_a_point_in_a_region_by_every_step(kind, shared, solver):
+def test_a_point_in_a_region_by_every_step(kind, shared):
     # The point alone is inverted; together with a second one at a random distance it takes a linear program.
     spot = PointIn(c(REGIONS[kind]))
     gap = between(1.0, 2.0)
@@ -160,7 +153,7 @@ def test_a_point_in_a_region_by_every_step(kind, shared, solver):
                 assert kind == "disc"
             else:
                 assert isinstance(outcome, expected), (x, y, outcome)
-            assert isinstance(ask([items], MatchOptions(tolerance=EXACT), solver), expected), (x, y)
+            assert isinstance(ask([items], MatchOptions(tolerance=EXACT), None), expected), (x, y)
 
 
 def test_two_positions_of_one_spot_must_agree():
@@ -232,7 +225,7 @@ def test_very_many_choices_are_left_to_a_solver():
     assert isinstance(decide([compared("width", total, 450.25)], DEFAULT), Undecided)
 
 
-def test_distance_to_a_region_and_boxes_in_the_solver(solver):
+def test_distance_to_a_region_and_boxes_in_the_solver():
     from scenicq.forest.groups import Condition
     from scenicq.forest.nodes import Compare, CompareOp, Distance, Encloses, Intersects, RectangleAt
     from scenicq.forest.scenario import Requirement
@@ -245,7 +238,7 @@ def test_distance_to_a_region_and_boxes_in_the_solver(solver):
             ask(
                 [[at, (Condition(Requirement(condition, None), condition), condition, None)]],
                 MatchOptions(tolerance=EXACT),
-                solver,
+                None,
             )
         )
 
@@ -263,12 +256,12 @@ def test_distance_to_a_region_and_boxes_in_the_solver(solver):
     assert verdict(Encloses(c(Disc((1.5, 0.0), 1.0)), box)) is Refuted
 
 
-def test_a_choice_of_words_in_the_solver(solver):
+def test_a_choice_of_words_in_the_solver():
     weather = Select(Index((1.0, 2.0)), (Constant("sun"), Constant("rain")))
     for observed, expected in (("rain", Satisfied), ("sun", Satisfied), ("snow", Refuted)):
         items = [compared("weather", weather, observed)]
-        assert isinstance(ask([items], MatchOptions(tolerance=EXACT), solver), expected)
+        assert isinstance(ask([items], MatchOptions(tolerance=EXACT), None), expected)
         assert isinstance(decide(items, EXACT), expected)
     for observed in (True, False):
         items = [compared("lit", Select(Index((1.0, 1.0)), (c(True), c(True))), observed)]
-        assert isinstance(ask([items], MatchOptions(tolerance=EXACT), solver), Satisfied if observed else Refuted)
+        assert isinstance(ask([items], MatchOptions(tolerance=EXACT), None), Satisfied if observed else Refuted)

@@ -48,11 +48,11 @@ def _scalar(rng: random.Random, scalars: list[Node], vectors: list[Node], ops: t
     return Arithmetic(op, tuple(rng.choice(scalars) for _ in range(2 if op in PAIRS else 1)))
 
 
-def random_expression(rng: random.Random, leaves: list[Node]) -> Node:
-    """A random number over the leaves, of which several operations may share parts."""
+def random_expression(rng: random.Random, leaves: list[Node], ops: tuple[ArithmeticOp, ...] = ()) -> Node:
+    """A random number over the leaves, of which several operations may share parts; of any ones, if none are named."""
     scalars = [*leaves, build.constant(random_number(rng, 10.0))]
     vectors: list[Node] = [VectorOf(rng.choice(scalars), rng.choice(scalars)) for _ in range(2)]
-    ops = RATIONAL if rng.random() < 0.5 else RATIONAL + OTHER
+    ops = ops or (RATIONAL if rng.random() < 0.5 else RATIONAL + OTHER)
     for _ in range(rng.randrange(1, 8)):
         u, v, a = rng.choice(vectors), rng.choice(vectors), rng.choice(scalars)
         if rng.random() < 0.6:

@@ -17,7 +17,7 @@ from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import EXACT, Tolerance
 from scenicq.match.verdict import Match, NoMatch
-from scenicq.smt.solver import open_solver
+from scenicq.query.execution.lazy_solver import LazySolver
 from scenicq.store.labels import Label, LabelObject
 
 LINE = [(-3.0, -6.0), (-3.0, 5.0), (2.0, 6.0), (4.0, -6.0)]
@@ -59,11 +59,11 @@ def beyond_borders(count):
 
 @pytest.fixture(scope="module", params=["portable", "dreal"])
 def solver(request):
-    try:
-        opened = open_solver(request.param)
-    except SolverError as error:
-        pytest.skip(error.diagnostics[0].message)
-    with opened:
+    with LazySolver(request.param) as opened:
+        try:
+            opened.loads()
+        except SolverError as error:
+            pytest.skip(error.diagnostics[0].message)
         yield opened
 
 

@@ -22,7 +22,7 @@ from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import EXACT, parse_tolerance
 from scenicq.match.verdict import Match, NoMatch, Unknown
-from scenicq.smt.solver import open_solver
+from scenicq.smt.worker_solver import WorkerSolver
 from scenicq.store.labels import Label, LabelObject
 
 from .nested_choices import REACH, Composer, clear, label_for, small_map
@@ -172,7 +172,7 @@ def test_what_is_left_of_an_option_goes_to_a_solver_where_nothing_else_decides_i
     scenario = compile_scenario(Source("nonlinear.scenic", NONLINEAR), street())
     options = MatchOptions(tolerance=EXACT)
     assert isinstance(Matcher(scenario, options).match(label), Unknown)
-    with open_solver("portable") as solver:
+    with WorkerSolver("built_in:check") as solver:
         verdict = Matcher(scenario, options, solver).match(label)
     if option is None:
         assert isinstance(verdict, NoMatch)

@@ -14,7 +14,6 @@ from scenicq.match.options import MatchOptions
 from scenicq.match.search.backtracking import SilentReporter
 from scenicq.match.search.first_fit import FirstFit
 from scenicq.match.verdict import Match
-from scenicq.smt.solver import open_solver
 
 ROWS = """
 ego = new Car on road
@@ -35,18 +34,12 @@ BY_THEMSELVES = ("ahead", "offset", "left of", "facing field", "normal", "rows",
 """Programs of which every drawn scene is decided without a search."""
 
 
-@pytest.fixture(scope="module")
-def solver():
-    with open_solver("portable") as opened:
-        yield opened
-
-
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("radius", [None, 30.0])
 @pytest.mark.one_in(4)
-def test_a_search_finds_the_same(name, radius, solver, monkeypatch):
+def test_a_search_finds_the_same(name, radius, monkeypatch):
     scenario = compiled(HEADER + CASES[name])
-    matcher = Matcher(scenario, MatchOptions(radius=radius), solver)
+    matcher = Matcher(scenario, MatchOptions(radius=radius))
     filled = []
     fill = FirstFit.fill
 

@@ -22,7 +22,6 @@ from scenicq.match.problem.candidates import candidates_of
 from scenicq.match.search.first_fit import LabelRow
 from scenicq.match.tolerance import Tolerance
 from scenicq.match.verdict import Match, NoMatch
-from scenicq.smt.solver import open_solver
 
 ROWS = """
 ego = new Car on road
@@ -66,12 +65,6 @@ OPTIONS = (
 )
 
 
-@pytest.fixture(scope="module")
-def solver():
-    with open_solver("portable") as opened:
-        yield opened
-
-
 def labels(scenario, seeds):
     for seed in seeds:
         rng = random.Random(seed)
@@ -98,9 +91,9 @@ def with_candidates(scenario, options, found):
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("options", OPTIONS, ids=["plain", "box", "disc"])
 @pytest.mark.one_in(4)
-def test_the_same_is_found_together(name, options, solver):
+def test_the_same_is_found_together(name, options):
     scenario = compiled(HEADER + CASES[name], STREET)
-    matcher = Matcher(scenario, options, solver)
+    matcher = Matcher(scenario, options)
     asked = with_candidates(matcher.scenario, options, labels(scenario, range(4)))
     alone = [matcher.match(label, among=among) for label, among in asked]
     together = list(matcher.match_all(asked))
@@ -159,9 +152,9 @@ def test_what_surely_matches_is_not_decided_one_by_one(name, monkeypatch):
 
 
 @pytest.mark.parametrize("name", ["ahead", "rows", "offset"])
-def test_labels_are_let_go_without_the_collector(name, solver):
+def test_labels_are_let_go_without_the_collector(name):
     scenario = compiled(HEADER + CASES[name], STREET)
-    matcher = Matcher(scenario, MatchOptions(), solver)
+    matcher = Matcher(scenario, MatchOptions())
     asked = with_candidates(matcher.scenario, MatchOptions(), labels(scenario, range(4)))
     gc.collect()
     with without_collector():

@@ -1,4 +1,4 @@
-"""A solver is opened by the first question, and asked none twice."""
+"""A solver is opened by the first question, once, and closed if it was."""
 
 from __future__ import annotations
 
@@ -12,28 +12,34 @@ from scenicq.smt.formula import TRUE, Problem
 
 def test_nothing_is_opened_before_the_first_question():
     with LazySolver("no-such-solver-anywhere") as solver, pytest.raises(SolverError):
-        solver.check(Problem((), TRUE), precision=1e-4, timeout_s=1.0)
-    with LazySolver("no-such-solver-anywhere") as solver:
-        assert solver.calls == 0
+        solver.loads()
+    with LazySolver("no-such-solver-anywhere"):
+        pass
 
 
-def test_a_question_is_asked_once(monkeypatch):
+def test_the_built_in_solver_is_nobody_to_ask():
+    with LazySolver("portable") as solver:
+        assert not solver.loads()
+
+
+def test_a_solver_is_opened_once(monkeypatch):
     asked = []
 
     class Counting:
-        name = "counting"
-
         def check(self, problem, *, precision, timeout_s):
-            asked.append(problem)
+            asked.append("asked")
             return Sat({})
 
         def close(self):
             asked.append("closed")
 
-    monkeypatch.setattr("scenicq.smt.solver.open_solver", lambda name: Counting())
+    def opened(name):
+        asked.append(f"opened {name}")
+        return Counting()
+
+    monkeypatch.setattr("scenicq.smt.solver.open_solver", opened)
     with LazySolver("any") as solver:
-        for _ in range(3):
+        for _ in range(2):
+            assert solver.loads()
             solver.check(Problem((), TRUE), precision=1e-4, timeout_s=1.0)
-        assert solver.calls == 3
-    assert len(asked) == 2
-    assert asked[-1] == "closed"
+    assert asked == ["opened any", "asked", "asked", "closed"]

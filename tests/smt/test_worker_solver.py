@@ -1,4 +1,4 @@
-"""The worker pool survives whatever a solver does to its process."""
+"""A solver in a worker process: its questions survive whatever it does to itself."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from scenicq.budget import limited, waiting
 from scenicq.errors import SolverError
 from scenicq.smt.answer import Answer, NoAnswer, Sat, Unsat
 from scenicq.smt.formula import TRUE, Problem, Variable
-from scenicq.smt.pool import WorkerSolver, _Worker
 from scenicq.smt.worker import read_answer, write_answer
+from scenicq.smt.worker_solver import WorkerSolver
 
 HERE = str(Path(__file__).parent)
 
@@ -27,7 +27,7 @@ HERE = str(Path(__file__).parent)
 @pytest.fixture
 def solver(monkeypatch: pytest.MonkeyPatch) -> Iterator[WorkerSolver]:
     monkeypatch.syspath_prepend(HERE)
-    with WorkerSolver("fake_checks:behave", jobs=2) as opened:
+    with WorkerSolver("fake_checks:behave") as opened:
         yield opened
 
 
@@ -97,24 +97,6 @@ def test_a_worker_killed_at_work_costs_one_problem(solver: WorkerSolver) -> None
     assert _check(solver, "fine") == Unsat()
 
 
-def test_answers_come_in_order(solver: WorkerSolver) -> None:
-    names = ["fine", "crash", "slow", "hang", "fine", "raise", "slow"]
-    answers = solver.check_many([_asked(name) for name in names], precision=1e-3, timeout_s=2.0)
-    reasons = [answer.reason if isinstance(answer, NoAnswer) else "" for answer in answers]
-    assert reasons == ["", "crash", "", "timeout", "", "crash", ""]
-
-
-def test_workers_run_side_by_side(solver: WorkerSolver, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setenv("FAKE_CHECKS", str(tmp_path))
-    # each answers only when the other has been asked
-    answers = solver.check_many([_asked("first"), _asked("second")], precision=1e-3, timeout_s=60.0)
-    assert answers == [Unsat()] * 2
-
-
-def test_no_problems(solver: WorkerSolver) -> None:
-    assert solver.check_many([], precision=1e-3, timeout_s=1.0) == []
-
-
 def test_memory_limit(monkeypatch: pytest.MonkeyPatch) -> None:
     if sys.platform != "linux":
         pytest.skip("the limit exists on Linux")
@@ -165,7 +147,7 @@ ORPHAN = """
 import sys, threading, time
 sys.path[:] = {path!r}
 from scenicq.smt.formula import TRUE, Problem, Variable
-from scenicq.smt.pool import WorkerSolver
+from scenicq.smt.worker_solver import WorkerSolver
 solver = WorkerSolver("fake_checks:behave")
 answer = solver.check(Problem((Variable("pid", 0.0, 1e9),), TRUE), precision=1.0, timeout_s=9.0)
 print(int(answer.witness["pid"]), flush=True)
@@ -191,7 +173,7 @@ def test_workers_die_with_a_killed_parent(task: str) -> None:
 def test_a_worker_loads_little() -> None:
     """A query pays for it once; the worker must not import what it does not need."""
     code = (
-        "import sys, scenicq.smt.worker, scenicq.smt.portable\n"
+        "import sys, scenicq.smt.worker, scenicq.smt.inverse_elimination\n"
         "print(*({'numpy', 'shapely', 'duckdb', 'pyarrow'} & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
@@ -210,9 +192,9 @@ def test_garbage_is_recognised(line: bytes) -> None:
 
 def test_a_worker_killed_at_its_start_is_started_anew(solver: WorkerSolver, monkeypatch: pytest.MonkeyPatch) -> None:
     spawned: list[int] = []
-    spawn = _Worker._spawn
+    spawn = WorkerSolver._spawn
 
-    def unlucky(worker: _Worker) -> dict[str, str]:
+    def unlucky(worker: WorkerSolver) -> dict[str, str]:
         greeting = spawn(worker)
         spawned.append(1)
         if len(spawned) in (1, 4, 5, 6):
@@ -220,7 +202,7 @@ def test_a_worker_killed_at_its_start_is_started_anew(solver: WorkerSolver, monk
             return {}
         return greeting
 
-    monkeypatch.setattr(_Worker, "_spawn", unlucky)
+    monkeypatch.setattr(WorkerSolver, "_spawn", unlucky)
     assert _check(solver, "fine") == Unsat()
     assert len(spawned) == 2
     assert _check(solver, "exit") == NoAnswer("crash")
@@ -232,7 +214,7 @@ def test_a_worker_killed_at_its_start_is_started_anew(solver: WorkerSolver, monk
 
 
 def test_a_solver_that_never_starts_is_missing(solver: WorkerSolver, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(_Worker, "_spawn", lambda worker: {})
+    monkeypatch.setattr(WorkerSolver, "_spawn", lambda worker: {})
     with pytest.raises(SolverError):
         _check(solver, "fine")
 
