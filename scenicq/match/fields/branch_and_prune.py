@@ -73,12 +73,11 @@ def _boxes(start: BoxSet) -> Iterator[BoxSet]:
     todo, seen = [start], 0
     while todo:
         look()
-        cases = todo.pop()
-        seen += cases.size
-        if seen > LIMITS.pruned_boxes:
-            raise exhausted("pruned_boxes")
-        for part in branch(cases):
+        for part in branch(todo.pop()):
             left = propagated(part)
             if left.size:
+                seen += left.size
+                if seen > LIMITS.pruned_boxes:
+                    raise exhausted("pruned_boxes")
                 yield left
                 todo.append(left)

@@ -8,7 +8,7 @@ is parted, first into ranges of headings close to each other, at last into singl
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TypeAlias, cast
 
 import numpy as np
@@ -141,8 +141,8 @@ def bisected(cases: BoxSet, below: Sequence[Leaf]) -> list[BoxSet]:
     return _halves(cases, *found[1:])
 
 
-def branch(cases: BoxSet) -> list[BoxSet]:
-    """The cases in parts: by a choice that is left to make, else by the widest range.
+def branch(cases: BoxSet) -> Iterable[BoxSet]:
+    """The cases in parts, each made when it is asked for: by a choice that is left to make, else by the widest range.
 
     Raises:
         Exhausted: They are too small for either.
@@ -213,7 +213,7 @@ def _turned(cases: BoxSet, node: DirectionAt) -> tuple[BoxSet, bool]:
     return cases.those(found[0] <= found[1]), gained
 
 
-def _parted(cases: BoxSet) -> list[BoxSet] | None:
+def _parted(cases: BoxSet) -> Iterable[BoxSet] | None:
     """The cases with one more choice made; None if there is none left to make."""
     for node in cases.network.choices:
         if isinstance(node, Index) and id(node) not in cases.chosen:
@@ -280,12 +280,10 @@ def _pieces(cases: BoxSet, node: DirectionAt) -> tuple[NDArray[np.intp], NDArray
     return owner[starts], np.stack([heading[starts], heading[ends]])
 
 
-def _split(cases: BoxSet, choice: Node, owner: NDArray[np.intp], options: NDArray[np.float64]) -> list[BoxSet]:
+def _split(cases: BoxSet, choice: Node, owner: NDArray[np.intp], options: NDArray[np.float64]) -> Iterator[BoxSet]:
     """The cases once for each option of a choice; the last axis of the options goes with the owners."""
-    found: list[BoxSet] = []
     for first in range(0, len(owner), _AT_ONCE):
         some = slice(first, first + _AT_ONCE)
         branches = cases.take(owner[some])
         branches.chosen[id(choice)] = options[..., some]
-        found.append(branches)
-    return found
+        yield branches
