@@ -78,23 +78,41 @@ def average_precision(found: Reals, wrong: Reals, objects: Reals, *, clipped: bo
         objects: How many label objects there are, shape (b,).
         clipped: See `Protocol`.
     """
-    precisions = np.zeros(len(found))
     with np.errstate(invalid="ignore", divide="ignore"):
         precision = found / (found + wrong) if clipped else found / (found + wrong + _TINY)
         recall = found / objects[:, None]
     precision = np.nan_to_num(precision)
     if not clipped:
         precision = np.maximum.accumulate(precision[:, ::-1], axis=1)[:, ::-1]
-    samples = np.linspace(0, 1, _SAMPLES)
-    for row in range(len(found)):
-        if objects[row] <= 0:
-            precisions[row] = math.nan
-        elif found.shape[1] and found[row, -1] > 0:
-            values = np.asarray(np.interp(samples, recall[row], precision[row], right=0), dtype=np.float64)
-            if clipped:
-                values = np.maximum(values[round(100 * _NEAREST) + 1 :] - _NEAREST, 0) / (1 - _NEAREST)
-            precisions[row] = values.mean()
-    return precisions
+    if not found.shape[1]:
+        return np.where(objects > 0, 0.0, math.nan)
+    values = _interpolated(np.linspace(0, 1, _SAMPLES), recall, precision)
+    if clipped:
+        values = np.maximum(values[:, round(100 * _NEAREST) + 1 :] - _NEAREST, 0) / (1 - _NEAREST)
+    return np.where(objects > 0, np.where(found[:, -1] > 0, values.mean(axis=1), 0.0), math.nan)
+
+
+def _interpolated(at: Reals, x: Reals, y: Reals) -> Reals:
+    """What `numpy.interp` says of each row, 0 beyond the last place.
+
+    Args:
+        at: Where, shape (m,).
+        x: Places of each row, from low to high, shape (b, n).
+        y: Values there, shape (b, n).
+
+    Returns:
+        Shape (b, m).
+    """
+    if len(x) == 1:
+        return np.asarray(np.interp(at, x[0], y[0], right=0), dtype=np.float64)[None]
+    above = (x[:, :, None] <= at).sum(axis=1)
+    low, high = np.maximum(above - 1, 0), np.minimum(above, x.shape[1] - 1)
+    x_low, x_high, y_low, y_high = (
+        np.take_along_axis(values, place, axis=1) for values, place in ((x, low), (x, high), (y, low), (y, high))
+    )
+    with np.errstate(invalid="ignore", divide="ignore"):
+        part = np.where(x_high > x_low, (at - x_low) / (x_high - x_low), 0.0)
+    return np.where(at > x[:, -1:], 0.0, y_low + np.clip(part, 0.0, 1.0) * (y_high - y_low))
 
 
 def mean_errors(score: Reals, is_found: NDArray[np.bool_], errors: Reals, objects: int, *, clipped: bool) -> Reals:
@@ -156,13 +174,13 @@ def resampled_errors(sums: Reals, counts: Reals, found: Reals, objects: Reals, *
         recall = found / objects[:, None]
     if not clipped:
         return means[:, -1]
-    samples = np.linspace(0, 1, _SAMPLES)
-    first = round(100 * _NEAREST) + 1
-    values = np.full(len(sums), math.nan)
-    for row in range(len(sums)):
-        known = counts[row] > 0
-        if known.any():
-            reached = samples[first:][samples[first:] <= recall[row, -1]]
-            between = np.asarray(np.interp(reached, recall[row, known], means[row, known]), dtype=np.float64)
-            values[row] = between.mean() if len(reached) else 1.0
-    return values
+    samples: Reals = np.linspace(0, 1, _SAMPLES)[round(100 * _NEAREST) + 1 :]
+    known = counts > 0
+    # before anything is known it is what becomes known first
+    begin: NDArray[np.int64] = np.argmax(known, axis=1)
+    told = np.take_along_axis(means, np.maximum(np.arange(means.shape[1], dtype=np.int64), begin[:, None]), axis=1)
+    reached = samples <= recall[:, -1:]
+    between = np.where(reached, _interpolated(samples, recall, told), 0.0)
+    number = np.maximum(np.count_nonzero(reached, axis=1), 1)
+    values = np.where(reached.any(axis=1), between.sum(axis=1) / number, 1.0)
+    return np.where(known.any(axis=1), values, math.nan)

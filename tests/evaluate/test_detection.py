@@ -13,6 +13,7 @@ from scenicq.errors import DataError
 from scenicq.evaluate import detection
 from scenicq.evaluate.detection import Detection, detect
 from scenicq.evaluate.evaluation import evaluate
+from scenicq.evaluate.precision import _interpolated
 from scenicq.importers.predictions import PLAIN, THRESHOLDS_M, Predictions, Protocol
 from scenicq.store.dataset import Dataset, open_dataset
 from scenicq.store.labels import Label, LabelObject, Recording
@@ -154,3 +155,14 @@ def test_boxes_of_the_other_frame_of_reference_are_refused(tmp_path: Path, *, of
     # a model that finds nothing is no mistake of the file
     lost = replace(placed[right], x=placed[right].x + 200.0)
     assert (detect(dataset, lost).owner[4.0] < 0).mean() > 0.9
+
+
+def test_rows_are_interpolated_as_numpy_does_each() -> None:
+    rng = np.random.default_rng(2)
+    at = np.linspace(0, 1, 101)
+    for _ in range(30):
+        x = np.sort(rng.integers(0, 12, (6, 9)) / 11, axis=1)
+        y = rng.random((6, 9))
+        found = _interpolated(at, x, y)
+        for row in range(6):
+            assert found[row] == pytest.approx(np.interp(at, x[row], y[row], right=0), abs=1e-12)
