@@ -7,7 +7,8 @@ import os
 import shutil
 import sys
 import time
-from collections.abc import Collection, Generator, Iterable, Iterator
+from collections import Counter
+from collections.abc import Collection, Generator, Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -232,7 +233,7 @@ def match(ctx: click.Context, scenario: str | None, dataset: str | None, *, prog
         _tell_cut(query, resume=resume)
     elif near is not None and not came_close:
         _tell_far(query)
-    cut = [each for each in query.funnel.warnings if each.code == "ranking-cut"]
+    cut = [each for each in query.funnel.warnings if each.code in ("ranking-cut", "no-density")]
     show(cut)
     limit = query.options.limit
     reached = limit is not None and query.funnel.matches >= limit
@@ -277,7 +278,18 @@ def _selected(
     if sample is not None:
         found = [each for each in found if isinstance(each.verdict, Match)]
         found = sample_diverse(found, sample) if diverse else sample_plain(found, sample)
-    yield from rank_results(query, found) if rank else found
+    if rank:
+        found = rank_results(query, found)
+        query.funnel.warnings += _without_density(found)
+    yield from found
+
+
+def _without_density(found: Sequence[Result]) -> Iterator[Diagnostic]:
+    """Say how many matches have no density, and why."""
+    reasons = Counter(each.density.reason for each in found if each.density is not None and each.density.log is None)
+    for reason, number in reasons.most_common():
+        message = f"{number} of {len(found)} matches have no density and come last: {reason}"
+        yield Diagnostic("no-density", message, severity="warning")
 
 
 def _conclude(

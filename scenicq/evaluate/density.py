@@ -6,6 +6,9 @@ the others are drawn, alike for all labels, and the density of the solved ones i
 
     p(features) = E over the others of p(solved variables) / |det of the features by them| * 1[requirements hold]
 
+Where a choice decides which variables there are, as in a mixture of distributions, the density is the sum over its
+outcomes, each by its probability and solved for variables of its own.
+
 What is left out is a constant of a program and map: the probability that its requirements hold.
 """
 
@@ -13,8 +16,8 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple, cast
 
 import numpy as np
@@ -24,11 +27,14 @@ from scenicq.evaluate.expression_arrays import UncomputedError, evaluate_arrays
 from scenicq.evaluate.observed_columns import ANGLES, Observed, ObservedColumns
 from scenicq.evaluate.variables import Draws, density_of, point_density
 from scenicq.forest.columns import Array, Data, Vectors, constant_column
+from scenicq.forest.condition import condition
 from scenicq.forest.groups import Comparison, Condition, Group
 from scenicq.forest.nodes import (
     Arithmetic,
     ArithmeticOp,
     Constant,
+    Coordinate,
+    DiscAt,
     Identity,
     Index,
     Leaf,
@@ -36,17 +42,26 @@ from scenicq.forest.nodes import (
     Normal,
     PointIn,
     Range,
+    RectangleAt,
+    Rotate,
+    Scale,
+    SectorAt,
     Select,
     TruncatedNormal,
     Value,
+    VectorOf,
+    VectorSum,
 )
-from scenicq.forest.walk import children, leaves, postorder, rebuild
+from scenicq.forest.walk import children, is_leaf, leaves, postorder, rebuild
 
 __all__ = ["GroupDensity", "GroupValues"]
 
 Reals = NDArray[np.float64]
 _CHUNK = 200
-_AFFINE = 1e-6
+_TINY = 1e-12
+"""Determinants up to this are those of features that hang together."""
+_OUTCOMES = 256
+"""Outcomes of choices that are counted one by one, at most."""
 _Draw = Callable[[Leaf, tuple[Data, ...]], Data]
 
 
@@ -56,7 +71,8 @@ class GroupValues(NamedTuple):
     Attributes:
         log, error: Logarithms of the densities of the features and their standard errors, shape (labels,); -inf outside
             of the support.
-        solved: Values of the solved variables, in the mean over the draws, shape (labels, variables).
+        solved: Values of the solved variables, in the mean over the draws, shape (labels, variables); of the features
+            themselves where outcomes of a choice are solved for different variables.
         log_size: Logarithm of the density of those values over that of the features, shape (labels,).
     """
 
@@ -115,8 +131,66 @@ class GroupDensity:
         Raises:
             UncomputedError: There is no density, or none that can be computed.
         """
+        outcomes = self._outcomes()
+        if outcomes is not None:
+            return self._of_outcomes(labels, outcomes)
         parts = [self._of_some(labels[start : start + _CHUNK]) for start in range(0, len(labels), _CHUNK)]
         return GroupValues(*map(np.concatenate, zip(*parts, strict=True)))
+
+    def _outcomes(self) -> Sequence[tuple[float, GroupDensity]] | None:
+        """The group given each outcome of the choices that decide which variables there are, with its probability.
+
+        Raises:
+            UncomputedError: There are too many, or under one of them a feature has no density.
+        """
+        expressions = [each.expression for each in self.group.constraints]
+        choices: dict[Identity, Index] = {}
+        for node in postorder(expressions):
+            if not isinstance(node, Select) or not isinstance(node.index, Index):
+                continue
+            if any(map(_is_continuous, leaves(*node.options))):
+                choices[node.index.identity] = node.index
+        if not choices:
+            return None
+        if math.prod(len(each.weights) for each in choices.values()) > _OUTCOMES:
+            raise UncomputedError(f"choices with more than {_OUTCOMES} outcomes have variables of their own")
+        found: list[tuple[float, GroupDensity]] = []
+        for chosen in itertools.product(*(range(len(each.weights)) for each in choices.values())):
+            weight = math.prod(
+                each.weights[number] / sum(each.weights) for each, number in zip(choices.values(), chosen, strict=True)
+            )
+            given = dict(zip(choices, map(float, chosen), strict=True))
+            found.append((weight, self._given(given)))
+        return found
+
+    def _given(self, given: Mapping[Identity, Value]) -> GroupDensity:
+        """The group where choices have come out so; what was of finite choices is still compared."""
+        memo: dict[int, Node] = {}
+        put = {
+            id(each): replace(each, expression=condition(each.expression, {}, given, memo))
+            for each in self.group.constraints
+        }
+        found = GroupDensity(replace(self.group, constraints=tuple(put.values())), self.draws)
+        for each in self._continuous:
+            if not any(map(_is_continuous, leaves(put[id(each)].expression))):
+                raise UncomputedError(f"`{each.property}` has a single value under an outcome of a choice")
+        found._finite = tuple(cast(Comparison, put[id(each)]) for each in self._finite)
+        conditions = [put[id(each)] for each in self._conditions]
+        found._conditions = tuple(cast(Condition, each) for each in conditions)
+        return found
+
+    def _of_outcomes(self, labels: Sequence[Observed], outcomes: Sequence[tuple[float, GroupDensity]]) -> GroupValues:
+        total, square = np.zeros(len(labels)), np.zeros(len(labels))
+        for weight, each in outcomes:
+            values = each.values(labels)
+            mine = weight * np.exp(values.log)
+            total += mine
+            square += np.square(mine * values.error)
+        columns = ObservedColumns(labels)
+        features = [target for target, _ in columns.targets(self._continuous)]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            errors = np.where(total > 0, np.sqrt(square) / total, 0.0)
+            return GroupValues(np.log(total), errors, np.column_stack(features), np.zeros(len(labels)))
 
     def _of_some(self, labels: Sequence[Observed]) -> GroupValues:
         columns = ObservedColumns(labels)
@@ -161,6 +235,9 @@ class GroupDensity:
                     rest = np.mod(rest + math.pi, math.tau) - math.pi + next(angle)
                 rows.append(rest)
             values, size = _solve(matrix, rows)
+            if np.any(size == 0):
+                names = ", ".join(f"`{each.property}`" for each in self._continuous)
+                raise UncomputedError(f"{names} of a group are not spread over an area under some hidden values")
             solved = self._assign(values)
             with np.errstate(all="ignore"):
                 density = np.where(size > 0, 1 / size, 0.0)
@@ -253,7 +330,7 @@ class GroupDensity:
             for chosen in itertools.islice(itertools.combinations(candidates, count), 400):
                 if sum(2 if isinstance(leaf, PointIn) else 1 for leaf in chosen) == wanted:
                     try:
-                        if self._is_affine(columns, chosen, wanted):
+                        if self._is_affine(columns.first(8), chosen, wanted):
                             return chosen
                     except UncomputedError as error:
                         self.reason = str(error)
@@ -265,23 +342,52 @@ class GroupDensity:
         return tuple(self._roots[id(each)] for each in self._continuous)
 
     def _is_affine(self, columns: ObservedColumns, chosen: Sequence[Leaf], wanted: int) -> bool:
-        few = columns.first(8)
-        rng = np.random.default_rng(1)
-        one, other = ([np.full((1, 1), value) for value in rng.uniform(-1, 1, wanted)] for _ in range(2))
-        middle = [(a + b) / 2 for a, b in zip(one, other, strict=True)]
-        low, high, between = (self._at(few, values, chosen) for values in (one, other, middle))
-        for a, b, c in zip(low, high, between, strict=True):
-            gap = np.abs((a + b) / 2 - c)
-            if not np.all(gap[np.isfinite(gap)] < _AFFINE * (1 + np.abs(c).max(initial=0, where=np.isfinite(c)))):
-                return False
-        zero = [np.zeros((1, 1))] * wanted
-        base = self._at(few, zero, chosen)
+        """Whether the features are affine in some variables, of which they tell the values."""
+        if _degree(self._roots_of_continuous(), {leaf.identity for leaf in chosen}) > 1:
+            return False
+        base = self._at(columns, [np.zeros((1, 1))] * wanted, chosen)
         columns_: list[list[Array]] = []
         for place in range(wanted):
             unit = [np.full((1, 1), float(place == number)) for number in range(wanted)]
-            columns_.append([x - y for x, y in zip(self._at(few, unit, chosen), base, strict=True)])
+            columns_.append([x - y for x, y in zip(self._at(columns, unit, chosen), base, strict=True)])
         _, size = _solve(columns_, [np.zeros((1, 1))] * wanted)
-        return bool(np.any(size > _AFFINE))
+        return bool(np.any(size > _TINY))
+
+
+_NEVER = 2
+"""The degree of what is not affine."""
+
+
+def _degree(roots: Sequence[Node], chosen: Collection[Identity]) -> int:
+    """0 for expressions that do not hang on some variables, 1 for affine ones, whatever the others come out as."""
+    degrees: dict[int, int] = {}
+    for node in postorder(roots):
+        own = [degrees[id(child)] for child in children(node)]
+        degrees[id(node)] = 1 if is_leaf(node) and cast(Leaf, node).identity in chosen else _degree_of(node, own)
+    return max(degrees[id(root)] for root in roots)
+
+
+def _degree_of(node: Node, own: Sequence[int]) -> int:
+    """The degree of an expression, from those of its children."""
+    most = max(own, default=0)
+    if not most:
+        return 0
+    match node:
+        case Arithmetic(op=ArithmeticOp.ADD | ArithmeticOp.SUB | ArithmeticOp.NEG):
+            return most
+        case Arithmetic(op=ArithmeticOp.MUL) | Scale():
+            return min(sum(own), _NEVER)
+        # a draw is what it is for other parameters, moved and stretched
+        case VectorOf() | VectorSum() | Coordinate() | Range() | Normal():
+            return most
+        case PointIn():
+            return most if isinstance(node.region, DiscAt | SectorAt | RectangleAt) else _NEVER
+        case Arithmetic(op=ArithmeticOp.DIV) | Rotate() | DiscAt() | SectorAt() | RectangleAt():
+            return own[0] if not any(own[1:]) else _NEVER
+        case Select():
+            return most if not own[0] else _NEVER
+        case _:
+            return _NEVER
 
 
 def _row_means(values: Array, rows: int) -> Reals:
@@ -370,6 +476,8 @@ def _solve(matrix: Sequence[Sequence[Array]], rest: Sequence[Array]) -> tuple[li
     sound = np.isfinite(full).all(axis=(-1, -2))
     full[~sound] = 0.0
     size = np.abs(np.linalg.det(full))
-    full[size <= 1e-12] = np.eye(count)
+    full[size <= _TINY] = np.eye(count)
     found = np.linalg.solve(full, np.nan_to_num(right))[..., 0]
-    return [found[..., number] for number in range(count)], np.where(size > 1e-12, size, 0.0)
+    # what is undefined has no determinant, what hangs together one of nothing
+    sizes = np.where(sound, np.where(size > _TINY, size, 0.0), np.nan)
+    return [found[..., number] for number in range(count)], sizes
