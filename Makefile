@@ -66,6 +66,7 @@ bench: $(READY) ## Measure queries, start-up, ingest, pictures and what each ste
 	$(BIN)/python tests/bench/ingest.py
 	$(BIN)/python tests/bench/pictures.py
 	$(BIN)/python tests/bench/evaluation.py
+	$(BIN)/python tests/bench/planted.py --page
 	$(BIN)/python tests/bench/steps.py
 	$(BIN)/python tests/bench/by_hand.py
 	$(BIN)/python tests/bench/intervals_by_hand.py
