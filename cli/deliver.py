@@ -92,10 +92,11 @@ def _deliver(
                 origin=origin,
                 ranked=wanted.ranked,
                 over_time=query.is_over_time(),
+                every=query.options.all_matches,
             )
         for result in itertools.chain(_kept(results, shown), _kept(near, close)):
             with bar.aside(), writing(file):
-                writer.write(record(result, origin))
+                writer.write(record(result, origin, every=query.options.all_matches))
             unlisted += wanted.form == "ids" and isinstance(result.verdict, NoMatch)
             if exporter is not None:
                 exporter.add(result)

@@ -14,19 +14,25 @@ from typing import BinaryIO, cast
 import click
 
 from scenicq.errors import DataError, Diagnostic, plain_json
+from scenicq.evaluate.clusters import CLUSTER_KEYS
+from scenicq.evaluate.comparison import MARGIN
 from scenicq.evaluate.detection import Missing
-from scenicq.evaluate.evaluation import Evaluation
+from scenicq.evaluate.evaluation import Evaluation, Results
 from scenicq.evaluate.evaluation import evaluate as judge
 from scenicq.evaluate.pages import write_pages
 from scenicq.evaluate.rows import COLUMNS, evaluation_record, flat_rows, overview, tables
-from scenicq.option_values import SCORE, SEED
+from scenicq.option_values import MARGIN_OPTION, SCORE, SEED
+from scenicq.query.execution.option_texts import read_options
+from scenicq.query.execution.run import Query
 from scenicq.report.write import check_target
+from scenicq.store.dataset import Dataset
 
 from .datasets import open_checked
 from .formats import CsvRows
 from .manual import Manual
 from .option_type import OptionType
 from .output import choose_format, destination, writing
+from .programs import read_scenario
 from .report import columns, plain, show
 from .sources import SENSORS, sensor_root
 
@@ -40,16 +46,18 @@ _EXTENSIONS = {".json": "json"}
 @click.command(
     cls=Manual,
     arguments={
-        "RESULTS...": "Files that `scenicq match -o` wrote, one a scenario: .jsonl, .csv or .parquet. All matches must "
-        "be there (no --limit, --sample): other frames count as those that do not match.",
+        "RESULTS...": "Programs (.scenic), which are matched, or files that `match -o` wrote, one a scenario: .jsonl, "
+        ".csv or .parquet. All matches must be there (no --limit, --sample): other frames count as those that do not "
+        "match. With `match --all-matches` all who can play a role are known; else nobody else of a frame that matches "
+        "is compared.",
         "DATASET": "The dataset that they are of.",
     },
     topics={
-        "What counts": {"predictions", "distance", "least_score", "missing", "simulated", "seed"},
+        "What counts": {"predictions", "distance", "least_score", "missing", "simulated", "cluster", "margin", "seed"},
         "What comes out": {"format_", "output", "report", "sensors"},
     },
     epilog="\b\nExamples:\n"
-    "  scenicq evaluate parked.jsonl dataset --predictions detections.json\n"
+    "  scenicq evaluate parked.scenic dataset --predictions detections.json\n"
     "  scenicq evaluate parked.jsonl cutin.jsonl dataset --predictions detections.feather --simulated runs.csv\n"
     "  scenicq evaluate parked.jsonl dataset --predictions detections.jsonl --report pages -o figures.json",
 )
@@ -67,6 +75,12 @@ _EXTENSIONS = {".json": "json"}
 @click.option("--simulated", metavar="FILE", type=click.Path(path_type=Path),
               help="Simulated runs to set beside it: CSV with `scenario` (the name of a results file) and `failed` or "
               "`score` (the share missed, 0 to 1).")
+@click.option("--cluster", metavar="KEY",
+              help="What errors may go by: recordings with one value of this parameter count as one, such as those of "
+              f"a drive; or `recording`.  [default: the first of {', '.join(CLUSTER_KEYS)} that all frames have, else "
+              "recording]")
+@click.option("--margin", metavar="SHARE", type=OptionType(MARGIN_OPTION), default=MARGIN,
+              help="What is missed more often by less than this counts as no worse.")
 @click.option("--seed", metavar="N", type=OptionType(SEED), default=0, help="Seed of the resamples.")
 @click.option("--format", "format_", metavar="NAME", type=click.Choice(_FORMATS),
               help="table, json, csv, spreadsheet (csv without formulas) or parquet.  [default: by the extension of "
@@ -76,14 +90,15 @@ _EXTENSIONS = {".json": "json"}
               help="Write a page with pictures, too, the worst frames first: DIR/index.html.")
 @SENSORS
 def evaluate(results: tuple[Path, ...], dataset: str, *, predictions: Path, distance: str, least_score: float | None,
-             missing: str, simulated: Path | None, seed: int, format_: str | None, output: Path | None,
-             report: Path | None, sensors: Path | None) -> None:
+             missing: str, simulated: Path | None, cluster: str | None, margin: float, seed: int,
+             format_: str | None, output: Path | None, report: Path | None, sensors: Path | None) -> None:
     # fmt: on
     """Say whether a model fails on the frames that match.
 
-    The objects that play roles are compared with others of their classes that are alike in distance and visibility,
-    in the same frames and in those that do not match. Frames of one recording resemble each other: intervals (95 %) and
-    tests are over recordings.
+    The objects that can play roles are compared with others of their classes that are alike in distance and visibility,
+    of the same frame if there are some, else of the same recording, else of frames under the same parameters. Frames of
+    one recording resemble each other: intervals (95 %) and tests are over recordings. Where these cannot tell, it says
+    what is missing. The tests of one command are corrected for each other, those of several commands are not.
     """
     file = None if output is None or str(output) == "-" else output
     form = _format(format_, file)
@@ -95,13 +110,15 @@ def evaluate(results: tuple[Path, ...], dataset: str, *, predictions: Path, dist
         check_target(report)
     opened = open_checked(dataset)
     found = judge(
-        dict(zip(names, results, strict=True)),
+        {name: _asked(each, opened) for name, each in zip(names, results, strict=True)},
         opened,
         predictions,
         distance_m=float(distance),
         least_score=least_score,
         missing=cast("Missing", missing),
         simulated=simulated,
+        cluster=cluster,
+        margin=margin,
         seed=seed,
     )
     with destination(file) as sink, writing(file):
@@ -109,6 +126,11 @@ def evaluate(results: tuple[Path, ...], dataset: str, *, predictions: Path, dist
     show(found.warnings)
     if report is not None:
         write_pages(found, opened, report, sensor_root(opened, sensors))
+
+
+def _asked(path: Path, dataset: Dataset) -> Results:
+    """Results, or a program to be matched."""
+    return Query(dataset, read_scenario(path), read_options()) if path.suffix == ".scenic" else path
 
 
 def _format(name: str | None, file: Path | None) -> str:
@@ -157,6 +179,7 @@ def _text(found: Evaluation) -> str:
             lines += ["", title, *columns([head, *rows])]
         lines.append("")
         lines += [plain(one.sentence) for one in (*each.headline, *each.weighted)]
+        lines += [plain(one.beside) for one in each.headline if one.asked]
         if each.simulated is not None:
             lines.append(plain(each.simulated.sentence))
         lines.append("")

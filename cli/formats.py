@@ -113,10 +113,11 @@ class _Csv:
 
 
 class _Parquet:
-    def __init__(self, sink: BinaryIO, roles: Sequence[str], origin: str, *, ranked: bool, over_time: bool) -> None:
+    def __init__(self, sink: BinaryIO, roles: Sequence[str], origin: str, *, ranked: bool, over_time: bool,
+                 every: bool) -> None:  # fmt: skip
         import pyarrow.parquet as pq  # noqa: PLC0415 - takes long to load
 
-        self._schema = result_schema(roles, origin=origin, ranked=ranked, over_time=over_time)
+        self._schema = result_schema(roles, origin=origin, ranked=ranked, over_time=over_time, every=every)
         self._file = pq.ParquetWriter(sink, self._schema)
         self._rows: list[Record] = []
 
@@ -143,6 +144,7 @@ def make_writer(
     origin: str = "",
     ranked: bool = False,
     over_time: bool = False,
+    every: bool = False,
 ) -> Writer:
     """The writer of a format.
 
@@ -154,15 +156,17 @@ def make_writer(
         origin: The dataset that the results come from; "" where it is not known.
         ranked: Whether results have a density.
         over_time: Whether the results are intervals.
+        every: Whether each correspondence by which a frame matches is a result.
     """
     if name == "parquet":
-        return _Parquet(sink, roles(), origin, ranked=ranked, over_time=over_time)
+        return _Parquet(sink, roles(), origin, ranked=ranked, over_time=over_time, every=every)
     text = TextStream(sink)
     match name:
         case "table":
             return Table(text, shorten, over_time=over_time)
         case "csv" | "spreadsheet":
-            left_out = {*(() if ranked else DENSITY), *(() if origin else ("dataset",))}
+            absent = {"all_matches": every, "dataset": bool(origin), **dict.fromkeys(DENSITY, ranked)}
+            left_out = {name for name, there in absent.items() if not there}
             kind = IntervalRecord if over_time else FrameRecord
             names = tuple(name for name in kind.__struct_fields__ if name not in left_out)
             return _Csv(text, names, spreadsheet=name == "spreadsheet")

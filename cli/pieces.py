@@ -45,7 +45,7 @@ def _whole(query: Query, shard: Shard, folder: Path, bar: ProgressBar) -> Iterat
     """
     origin = name_origin(query.dataset)
     for result in query.results(bar.advance):
-        yield record(result, origin)
+        yield record(result, origin, every=query.options.all_matches)
     if query.funnel.cut:
         number, count = shard
         message = f"shard {number}/{count} was not finished by the --deadline, and a shard is kept whole or not at all"

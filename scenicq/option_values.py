@@ -18,6 +18,7 @@ __all__ = [
     "FURTHEST_M",
     "HALF",
     "LONGEST_S",
+    "MARGIN_OPTION",
     "SCORE",
     "SEED",
     "WIDTH",
@@ -193,6 +194,8 @@ SEED = Count(0)
 """A seed of random numbers."""
 SCORE = Amount("", -math.inf, math.inf)
 """The score of a prediction."""
+MARGIN_OPTION = Amount("", 0.0, 1.0, above=True)
+"""A share of objects that counts as none."""
 
 
 def read_option(name: str, kind: OptionKind, value: Any) -> Any:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from scenicq.evaluate.detection import ERRORS_AT_M, Detection
 from scenicq.evaluate.precision import ERRORS, average_precision, mean_errors, resampled_errors
-from scenicq.evaluate.resampling import Interval, effective_number, interval_of, rate_interval
+from scenicq.evaluate.resampling import Interval, effective_number, interval_of, ratio_interval
 
 __all__ = ["ClassFigures", "class_figures"]
 
@@ -35,7 +35,7 @@ class ClassFigures:
         group: "matching" or "other".
         distance_m: The centre distance.
         objects, predictions: How many there are, predictions of the least score asked for only.
-        recordings: Effective number of recordings.
+        recordings: Effective number of clusters.
         recall, precision: Of the predictions that have the least score asked for.
         average_precision: Over all scores.
         errors: By name, at `ERRORS_AT_M` only.
@@ -54,7 +54,7 @@ class ClassFigures:
 
 
 def class_figures(
-    detection: Detection, group: str, frames: Bools, weights: Reals, least: float
+    detection: Detection, group: str, frames: Bools, cluster: NDArray[np.int64], weights: Reals, least: float
 ) -> Iterator[ClassFigures]:
     """The figures of each class that has label objects.
 
@@ -62,7 +62,8 @@ def class_figures(
         detection: Labels and predictions.
         group: What the frames are called.
         frames: Which frames count, shape (frames,).
-        weights: How often each recording counts in each resample, shape (resamples, recordings).
+        cluster: Number of each frame's cluster, shape (frames,).
+        weights: How often each cluster counts in each resample, shape (resamples, clusters).
         least: Score from which predictions count for recall and precision.
     """
     weights = weights[:_RESAMPLES]
@@ -70,37 +71,36 @@ def class_figures(
         objects = np.flatnonzero((detection.object_class == number) & frames[detection.objects.frame])
         if len(objects):
             mine = np.flatnonzero((detection.prediction_class == number) & frames[detection.frame])
-            one = _OneClass(detection, category, group, objects, mine, weights, least)
+            one = _OneClass(detection, category, group, objects, mine, cluster, weights, least)
             yield from (one.figures(distance) for distance in detection.owner)
 
 
 class _OneClass:
-    """Label objects and predictions of one class, counted by recording."""
+    """Label objects and predictions of one class, counted by cluster."""
 
     def __init__(
         self, detection: Detection, category: str, group: str, objects: NDArray[np.int64], mine: NDArray[np.int64],
-        weights: Reals, least: float,
+        cluster: NDArray[np.int64], weights: Reals, least: float,
     ) -> None:  # fmt: skip
         self._detection, self._category, self._group = detection, category, group
         self._objects, self._mine, self._weights = objects, mine, weights
-        recording = detection.frames.recording
-        self._of_objects = recording[detection.objects.frame[objects]]
-        self._of_mine = recording[detection.frame[mine]]
-        self._recordings = weights.shape[1]
+        self._of_objects = cluster[detection.objects.frame[objects]]
+        self._of_mine = cluster[detection.frame[mine]]
+        self._clusters = weights.shape[1]
         self._clipped = detection.predictions.protocol.clipped
         self._least = least
         self._high = detection.predictions.score[mine] >= least
-        self._per = np.bincount(self._of_objects, minlength=self._recordings).astype(np.float64)
+        self._per = np.bincount(self._of_objects, minlength=self._clusters).astype(np.float64)
         self._number = effective_number(self._per)
         self._bin = np.arange(len(mine)) * _BINS // max(len(mine), 1)
 
-    def _by_recording(self, which: Bools) -> Reals:
-        return np.bincount(self._of_mine[which], minlength=self._recordings).astype(np.float64)
+    def _by_cluster(self, which: Bools) -> Reals:
+        return np.bincount(self._of_mine[which], minlength=self._clusters).astype(np.float64)
 
     def _binned(self, values: Reals) -> Reals:
         """Sums up to each class of scores in each resample, shape (resamples, bins)."""
         places = self._of_mine * _BINS + self._bin
-        table = np.bincount(places, weights=values, minlength=self._recordings * _BINS)
+        table = np.bincount(places, weights=values, minlength=self._clusters * _BINS)
         return np.cumsum(self._weights @ table.reshape(-1, _BINS), axis=1)
 
     def figures(self, distance: float) -> ClassFigures:
@@ -108,8 +108,8 @@ class _OneClass:
         detection = self._detection
         found = detection.owner[distance][self._mine] >= 0
         hit = detection.score[distance][self._objects] >= self._least
-        hits = np.bincount(self._of_objects[hit], minlength=self._recordings).astype(np.float64)
-        right, all_high = self._by_recording(found & self._high), self._by_recording(self._high)
+        hits = np.bincount(self._of_objects[hit], minlength=self._clusters).astype(np.float64)
+        right, all_high = self._by_cluster(found & self._high), self._by_cluster(self._high)
         objects = np.array([float(len(self._objects))])
         exact = average_precision(
             np.cumsum(found, dtype=np.float64)[None], np.cumsum(~found, dtype=np.float64)[None], objects,
@@ -139,9 +139,7 @@ class _OneClass:
     def _ratio(self, part: Reals, whole: Reals) -> Figure:
         total = float(whole.sum())
         rate = float(part.sum()) / total if total else math.nan
-        with np.errstate(invalid="ignore", divide="ignore"):
-            resampled = (self._weights @ part) / (self._weights @ whole)
-        return rate, rate_interval(resampled, rate, effective_number(whole))
+        return rate, ratio_interval(part, whole, total)
 
     def _errors(self, found: Bools, founds: Reals, objects: Reals) -> dict[str, Figure]:
         detection, protocol = self._detection, self._detection.predictions.protocol

@@ -3,42 +3,64 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
+from statistics import NormalDist
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from scenicq.evaluate.controls import PLACES, Controls, Likeness, find_controls, number_of
 from scenicq.evaluate.resampling import (
-    FEW,
+    CLUSTERS,
+    LEVEL,
     Interval,
-    StratumCounts,
+    count_test,
+    difference_interval,
     effective_number,
-    interval_of,
-    rate_interval,
-    rates,
+    ratio_interval,
     sign_flip_test,
+    student,
+    sums_by,
 )
 
 __all__ = [
     "DISTANCES_M",
+    "MARGIN",
     "ObjectComparison",
+    "Says",
     "Share",
     "compare",
     "distance_names",
     "p_text",
     "percent",
     "share_of",
-    "strata_of",
 ]
 
 Reals = NDArray[np.float64]
 Numbers = NDArray[np.int64]
 Bools = NDArray[np.bool_]
+Says = Literal["worse", "better", "no worse", "too little"]
 
 DISTANCES_M = (10.0, 20.0, 30.0, 50.0)
-"""Ends of the classes of distance from the ego."""
+"""Ends of the classes of distance from the ego, for slices."""
+MARGIN = 0.05
+"""What is missed more often by less than this counts as no worse."""
+_ALPHA = 0.05
+_VERDICT = 6.0
+"""Effective number of clusters below which no difference can be told: the flips of five have no p-value under 0.05."""
+_OTHERS = 10.0
+"""Effective number of others below which there is no verdict."""
+_MISSES = 5.0
+"""Misses of both groups, at their effective numbers, below which there is no verdict."""
+_ALONE = 0.5
+"""Share of objects in question without others above which the rest does not speak for them."""
+_PARTS = 5
+_TOLD = 0.1
+"""The difference for which it is said how many recordings would tell it."""
+_POWER = 0.8
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,13 +70,15 @@ class Share:
     Attributes:
         missed, of: How many; weighted, where the others are spread as the group is.
         rate: The share; nan without objects.
-        interval: Of 95 %.
+        interval: Of 95 %; nan where there are too few recordings for one.
+        recordings: How many equally large clusters would tell as much.
     """
 
     missed: float
     of: float
     rate: float
     interval: Interval
+    recordings: float = math.nan
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,14 +87,21 @@ class ObjectComparison:
 
     Attributes:
         about: What is compared, such as "role parkedCar".
-        share: Of the objects in question.
-        other: Of the others, spread over distance and visibility as the objects in question are.
+        share: Of the objects in question to which others are alike; of all of them where none is.
+        other: Of those others, spread as the objects in question are, and corrected for what distances still differ.
         difference: Of the two rates.
         interval: Of the difference.
-        p_value: Of the test that objects of both groups are missed alike.
-        recordings: With an object in question.
-        effective: Number of equally large recordings that would tell as much.
-        alone: Share of the objects in question to which no other is alike.
+        p_value: Of the test that objects of both groups are missed alike; nan where there is no verdict.
+        recordings: Clusters with an object in question that is compared.
+        effective: Number of equally large clusters that would tell as much, of the group that has fewer.
+        asked: How many objects are in question.
+        alone: Share of them to which no other is alike.
+        missing: What is missing for a verdict, in words; empty where there is one.
+        places: How many of the objects in question are set beside others of each of `PLACES`.
+        margin: What is missed more often by less than this counts as no worse.
+        unit: What clusters are, such as "recording".
+        more: How many clusters more of this kind would tell a difference of ten points with 80 % power; None where
+            nothing says how they differ.
         p_corrected: The same p-value, corrected for all tests of the evaluation.
         uncounted: How many more objects would be in question, but for the rules of the benchmark.
     """
@@ -83,14 +114,47 @@ class ObjectComparison:
     p_value: float
     recordings: int
     effective: float
+    asked: int = 0
     alone: float = 0.0
+    missing: tuple[str, ...] = ()
+    places: tuple[int, ...] = (0,) * len(PLACES)
+    margin: float = MARGIN
+    unit: str = "recording"
+    more: int | None = None
     p_corrected: float = math.nan
     uncounted: int = 0
 
     @property
-    def few(self) -> bool:
-        """Whether there are too few recordings for a verdict."""
-        return self.effective < FEW
+    def says(self) -> Says:
+        """What the recordings say of the objects in question."""
+        p_value = self.p_value if math.isnan(self.p_corrected) else self.p_corrected
+        if self.missing:
+            return "too little"
+        if p_value < _ALPHA:
+            return "worse" if self.difference > 0 else "better"
+        return "no worse" if self.interval[1] < self.margin else "too little"
+
+    @property
+    def because(self) -> str:
+        """Why it says too little; "" where it does not."""
+        if self.says != "too little":
+            return ""
+        low, high = (100 * end for end in self.interval)
+        told = "; ".join(self.missing) or f"the difference may be anything from {low:+.0f} to {high:+.0f} points"
+        if not self.more:
+            return told
+        units = f"{self.more:,} more {self.unit}{'s' if self.more != 1 else ''} of this kind"
+        return f"{told}; about {units} would tell a difference of {100 * _TOLD:g} points ({100 * _POWER:g} % power)"
+
+    @property
+    def beside(self) -> str:
+        """Whom the objects in question are set beside, in words."""
+        places = ("of the same frame", "of the same recording", f"of the same {self.unit}", "elsewhere")
+        told = [
+            f"{number:,} beside others {place}" for number, place in zip(self.places, places, strict=True) if number
+        ]
+        without = self.asked - sum(self.places)
+        return f"{self.about}: {', '.join([*told, *([f'{without:,} without others'] if without else [])])}"
 
     @property
     def sentence(self) -> str:
@@ -105,8 +169,14 @@ class ObjectComparison:
             text += f"; {p_text(self.p_value)}"
             if not math.isnan(self.p_corrected) and self.p_corrected != self.p_value:
                 text += f" (corrected {p_text(self.p_corrected)})"
-        text += f" over {self.recordings} recording{'s' if self.recordings != 1 else ''}"
-        return text + (": too few for a verdict" if self.few else "")
+        text += f" over {self.recordings} {self.unit}{'s' if self.recordings != 1 else ''}"
+        told = {
+            "worse": "worse than others that are alike",
+            "better": "better than others that are alike",
+            "no worse": f"no worse than others that are alike, to {100 * self.margin:g} points",
+            "too little": f"too little to tell: {self.because}",
+        }
+        return f"{text}: {told[self.says]}"
 
 
 def p_text(value: float) -> str:
@@ -132,21 +202,16 @@ def distance_names() -> tuple[str, ...]:
     )
 
 
-def _table(values: Reals, recording: Numbers, stratum: Numbers, shape: tuple[int, int]) -> Reals:
-    """Sums by recording and stratum."""
-    sums = np.bincount(recording * shape[1] + stratum, weights=values, minlength=shape[0] * shape[1])
-    return sums.astype(np.float64).reshape(shape)
-
-
 def compare(
     about: str,
     missed: Bools,
     mine: Bools,
     others: Bools,
-    recording: Numbers,
-    stratum: Numbers,
-    weights: Reals,
+    like: Likeness,
     rng: np.random.Generator,
+    *,
+    margin: float = MARGIN,
+    unit: str = "recording",
 ) -> ObjectComparison:
     """Compare two groups of objects.
 
@@ -155,69 +220,140 @@ def compare(
         missed: Whether each object was missed, shape (n,).
         mine: The objects in question, shape (n,).
         others: Those that they are compared with, shape (n,).
-        recording: Number of each object's recording, shape (n,).
-        stratum: Number of each object's stratum; objects of one are alike.
-        weights: How often each recording counts in each resample, shape (resamples, recordings).
+        like: What makes objects alike.
         rng: Source of randomness of the test.
+        margin: What is missed more often by less than this counts as no worse.
+        unit: What clusters are.
     """
-    strata = int(stratum.max()) + 1 if len(stratum) else 1
-    shape = (weights.shape[1], strata)
+    found = find_controls(mine, others, like)
+    if not found.compared.any():
+        share = share_of(missed, mine, like.cluster)
+        nothing = Share(0.0, 0.0, math.nan, (math.nan, math.nan))
+        missing = ("no other object is alike",) if mine.any() else ("no object is in question",)
+        recordings = len(np.unique(like.cluster[mine]))
+        asked = int(mine.sum())
+        return ObjectComparison(
+            about, share, nothing, math.nan, (math.nan, math.nan), math.nan, recordings, 0.0, asked, float(asked > 0),
+            missing, found.places, margin, unit,
+        )  # fmt: skip
+    return _compared(about, missed, found, int(mine.sum()), like, rng, margin, unit)
 
-    def table(values: Bools) -> Reals:
-        return _table(values.astype(np.float64), recording, stratum, shape)
 
-    counts = StratumCounts(table(missed & mine), table(mine), table(missed & others), table(others))
-    used = (counts.of.sum(axis=0) > 0) | (counts.other_of.sum(axis=0) > 0)
-    counts = StratumCounts(
-        counts.missed[:, used], counts.of[:, used], counts.other_missed[:, used], counts.other_of[:, used]
+def _compared(
+    about: str, missed: Bools, found: Controls, asked: int, like: Likeness, rng: np.random.Generator, margin: float,
+    unit: str,
+) -> ObjectComparison:  # fmt: skip
+    lost = missed.astype(np.float64)
+    count = int(like.cluster.max()) + 1
+
+    def by_cluster(values: Reals | Bools) -> Reals:
+        return sums_by(like.cluster, values, count)
+
+    number = int(found.compared.sum())
+    own = found.compared / number
+    of, of_others = by_cluster(own), by_cluster(found.weight)
+    first, difference = float(own @ lost), float(found.difference @ lost)
+    second = min(max(first - difference, 0.0), 1.0)
+    effective = min(effective_number(of), effective_number(of_others))
+    parts = by_cluster(own * lost), by_cluster((own - found.difference) * lost)
+    scale = effective / max(effective - 1, 0.5)
+    spread = float(np.square(parts[0] - first * of - parts[1] + (first - difference) * of_others).sum()) * scale
+    # as many objects of each group as would vary as much, were they independent
+    numbers = tuple(1 / float(np.square(found.difference[which]).sum()) for which in (found.compared, ~found.compared))
+    independent = first * (1 - first) / numbers[0] + second * (1 - second) / numbers[1]
+    least = _spread_within(lost, found, like)
+    design = max(least, spread) / independent if independent > 0 else max(1.0, number / effective)
+    first_number, second_number = (each / design for each in numbers)
+    misses = first * first_number + second * second_number
+    needed = (
+        sum(map(NormalDist().inv_cdf, ((1 + LEVEL) / 2, _POWER))) ** 2 * design * independent / _TOLD**2 * effective,
+        _VERDICT,
+        _OTHERS / second_number * effective,
+        _MISSES / misses * effective if misses else 0.0,
     )
-    first, second = (float(values[0]) for values in rates(counts, np.ones((1, shape[0]))))
-    many, many_others = rates(counts, weights)
-    effective = effective_number(counts.of.sum(axis=1))
-    comparable = counts.comparable
-    of_others = counts.other_of[:, comparable]
-    # the number of the others, were they spread as the group is
-    spread = counts.of[:, comparable].sum(axis=0) / np.maximum(of_others.sum(axis=0), 1)
-    effective_others = effective_number((of_others * spread).sum(axis=1))
-    total = float(counts.of.sum())
-    alike = float(counts.of[:, comparable].sum())
-    both = min(effective, effective_others) if alike else 0.0
+    clusters = int((of > 0).sum())
+    missing = tuple(_missing(1 - number / asked, effective, second_number, misses, unit))
+    p_value = math.nan
+    if not missing:
+        # where others are of the same cluster, what is expected of both cancels
+        expected = _mean_of(lost, np.abs(found.difference), _alike(found, like)) if found.elsewhere.any() else 0.0
+        scores = by_cluster(found.difference * (lost - expected))
+        counted = count_test(first, second, (first_number, second_number))
+        p_value = max(counted, sign_flip_test(scores, rng))
+    interval = (math.nan, math.nan)
+    if effective >= CLUSTERS:
+        interval = difference_interval(first, second, (first_number, second_number), student(LEVEL, effective))
     return ObjectComparison(
         about=about,
-        share=Share(float(counts.missed.sum()), total, first, rate_interval(many, first, effective)),
-        other=Share(
-            float(counts.other_missed[:, comparable].sum()),
-            float(of_others.sum()),
-            second,
-            rate_interval(many_others, second, effective_others),
+        share=Share(
+            float(lost[found.compared].sum()),
+            float(number),
+            first,
+            ratio_interval(by_cluster(found.compared * lost), by_cluster(found.compared), float(number)),
+            effective_number(of),
         ),
-        difference=first - second,
-        interval=interval_of(many - many_others, both),
-        p_value=sign_flip_test(counts, rng) if alike else math.nan,
-        recordings=int((counts.of.sum(axis=1) > 0).sum()),
+        other=Share(
+            float(lost[found.weight > 0].sum()),
+            float((found.weight > 0).sum()),
+            second,
+            ratio_interval(np.clip(parts[1], 0.0, of_others), of_others, numbers[1]),
+            effective_number(of_others),
+        ),
+        difference=difference,
+        interval=interval,
+        p_value=p_value,
+        recordings=clusters,
         effective=effective,
-        alone=1 - alike / total if total else 0.0,
+        asked=asked,
+        alone=1 - number / asked,
+        missing=missing,
+        places=found.places,
+        margin=margin,
+        unit=unit,
+        more=max(0, math.ceil((max(needed) / effective - 1) * clusters)) if misses else None,
     )
 
 
-def share_of(missed: Bools, mine: Bools, recording: Numbers, weights: Reals) -> Share:
+def _missing(alone: float, effective: float, others: float, misses: float, unit: str) -> Iterator[str]:
+    """What is missing for a verdict."""
+    if alone > _ALONE:
+        yield f"{100 * alone:.0f} % have no other object that is alike"
+    if effective < _VERDICT:
+        yield f"it is as much as {effective:.1f} equally large {unit}s would tell, and {_VERDICT:g} are needed"
+    if others < _OTHERS:
+        yield f"the others tell as much as {others:.1f} independent ones would, and {_OTHERS:g} are needed"
+    elif misses < _MISSES:
+        yield f"{misses:.1f} independent misses, and {_MISSES:g} are needed"
+
+
+def _alike(found: Controls, like: Likeness) -> Numbers:
+    """The number of a group of objects that are alike, those of both groups together, shape (n,)."""
+    ends = np.unique(np.quantile(like.distance[found.compared], np.linspace(0, 1, _PARTS + 1)[1:-1]))
+    return number_of((like.kind, like.params, np.searchsorted(ends, like.distance).astype(np.int64)))
+
+
+def _mean_of(lost: Reals, weight: Reals, group: Numbers) -> Reals:
+    """The weighted mean of each object's group, shape (n,)."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.nan_to_num(sums_by(group, weight * lost) / sums_by(group, weight))[group]
+
+
+def _spread_within(lost: Reals, found: Controls, like: Likeness) -> float:
+    """The variance of the difference if each object were missed by itself, at the rate of those that are alike.
+
+    Clusters cannot show less: what they show of few misses is chance.
+    """
+    group = number_of((_alike(found, like), found.compared.astype(np.int64)))
+    weight = np.square(found.difference)
+    rate = _mean_of(lost, weight, group)
+    used = (weight > 0).astype(np.float64)
+    count = sums_by(group, used)[group]
+    return float(weight @ (rate * (1 - rate) * count / np.maximum(count - 1, 1)))
+
+
+def share_of(missed: Bools, mine: Bools, cluster: Numbers, level: float = LEVEL) -> Share:
     """The share missed of one group; arguments as of `compare`."""
-    shape = (weights.shape[1], 1)
-    zero = np.zeros(len(recording), dtype=np.int64)
-    of = _table(mine.astype(np.float64), recording, zero, shape)[:, 0]
-    lost = _table((missed & mine).astype(np.float64), recording, zero, shape)[:, 0]
+    of, lost = sums_by(cluster, mine), sums_by(cluster, missed & mine)
     total = float(of.sum())
     rate = float(lost.sum()) / total if total else math.nan
-    with np.errstate(invalid="ignore", divide="ignore"):
-        resampled = (weights @ lost) / (weights @ of)
-    return Share(float(lost.sum()), total, rate, rate_interval(resampled, rate, effective_number(of)))
-
-
-def strata_of(columns: Sequence[Numbers]) -> Numbers:
-    """The number of each object's stratum: objects are alike if they are in every column."""
-    if not columns:
-        return np.zeros(0, dtype=np.int64)
-    found = np.zeros(len(columns[0]), dtype=np.int64)
-    for column in columns:
-        _, found = np.unique(found * (int(column.max(initial=0)) + 1) + column, return_inverse=True)
-    return found
+    return Share(float(lost.sum()), total, rate, ratio_interval(lost, of, total, level), effective_number(of))

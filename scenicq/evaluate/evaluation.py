@@ -17,7 +17,9 @@ from numpy.typing import NDArray
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.evaluate.classes import ClassFigures, class_figures
-from scenicq.evaluate.comparison import DISTANCES_M, ObjectComparison, compare, strata_of
+from scenicq.evaluate.clusters import Clusters, find_clusters, parameters_of
+from scenicq.evaluate.comparison import MARGIN, ObjectComparison, compare
+from scenicq.evaluate.controls import Likeness, number_of
 from scenicq.evaluate.detection import Detection, Missing, detect
 from scenicq.evaluate.matched import Matched, read_matched
 from scenicq.evaluate.resampling import holm, resamples
@@ -26,11 +28,12 @@ from scenicq.evaluate.slices import Slice, slices
 from scenicq.evaluate.weighting import Weighted, weighted
 from scenicq.importers.prediction_files import read_predictions
 from scenicq.importers.predictions import THRESHOLDS_M, Predictions
-from scenicq.option_values import SCORE, SEED, OneOf, read_option
+from scenicq.option_values import MARGIN_OPTION, SCORE, SEED, OneOf, read_option
 from scenicq.query.execution.records import FrameRecord, IntervalRecord, Record, record, record_of
 from scenicq.query.execution.result_files import read_records
 from scenicq.query.execution.result_origin import check_origins, name_origin
 from scenicq.query.execution.results import Result
+from scenicq.query.execution.run import Query
 from scenicq.store.dataset import Dataset
 
 __all__ = ["Evaluation", "ScenarioEvaluation", "WorstFrame", "evaluate"]
@@ -38,10 +41,13 @@ __all__ = ["Evaluation", "ScenarioEvaluation", "WorstFrame", "evaluate"]
 Bools = NDArray[np.bool_]
 Reals = NDArray[np.float64]
 
-Results: TypeAlias = Path | str | Iterable[Result | Record | Mapping[str, Any]]
-"""A file of results, results as a query gives them, or records of them, which may be plain values."""
+Results: TypeAlias = Query | Path | str | Iterable[Result | Record | Mapping[str, Any]]
+"""A query, of which every correspondence is found; a file of results; results as a query gives them; or records of
+them, which may be plain values."""
 
 _WORST = 50
+_ALONE = 0.2
+"""Share of objects in question without others from which it is told."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +85,8 @@ class ScenarioEvaluation:
         simulated: The scenario in simulation; None without.
         missed: Whether each label object was missed, for pictures.
         mine: The objects in question.
+        coincident: Parameters of which frames that match have values that no other frame has.
+        one_each: Whether the results say one correspondence of each frame, and others may play a role, too.
     """
 
     name: str
@@ -93,6 +101,8 @@ class ScenarioEvaluation:
     simulated: Simulated | None
     missed: Bools
     mine: Bools
+    coincident: tuple[str, ...] = ()
+    one_each: bool = False
 
     @property
     def headline(self) -> tuple[ObjectComparison, ...]:
@@ -133,6 +143,8 @@ def evaluate(
     least_score: float | None = None,
     missing: Missing = "error",
     simulated: Path | str | None = None,
+    cluster: str | None = None,
+    margin: float = MARGIN,
     seed: int = 0,
 ) -> Evaluation:
     """Judge a model's detections on the frames that match, against the other frames.
@@ -145,6 +157,9 @@ def evaluate(
         least_score: Score from which a prediction counts, but for average precision; all by default.
         missing: What a frame without predictions is: an error, a frame in which nothing was found, or left out.
         simulated: A CSV file of simulated runs; see `read_simulated`.
+        cluster: The parameter whose values recordings of one cluster share, such as `drive`, or `recording`; by default
+            the first of `CLUSTER_KEYS` that the dataset has.
+        margin: What is missed more often by less than this share counts as no worse.
         seed: Seed of the resamples: the same figures come from the same seed.
 
     Raises:
@@ -156,7 +171,8 @@ def evaluate(
         raise DataError(Diagnostic("option-invalid", f"no centre distance of {distance_m:g} m", hints=(hint,)))
     seed, missing = read_option("seed", SEED, seed), read_option("missing", OneOf(get_args(Missing)), missing)
     least_score = None if least_score is None else read_option("least_score", SCORE, least_score)
-    runs = None if simulated is None else read_simulated(Path(simulated), seed)
+    margin = read_option("margin", MARGIN_OPTION, margin)
+    runs = None if simulated is None else read_simulated(Path(simulated))
     named: Mapping[str, Results] = (
         cast("Mapping[str, Results]", results) if isinstance(results, Mapping) else {_name_of(results): results}
     )
@@ -167,9 +183,9 @@ def evaluate(
     if least_score is None:
         least_score = float(detection.predictions.score.min(initial=0.0))
     rng = np.random.default_rng(seed)
-    judge = _Judge(detection, distance_m, least_score, rng)
+    judge = _Judge(detection, distance_m, least_score, rng, margin, find_clusters(detection.frames, cluster))
     doubts: list[Diagnostic] = []
-    found = [judge.scenario(read_matched(name, _own(name, _records(each), dataset, doubts), detection.frames,
+    found = [judge.scenario(read_matched(name, _own(name, _records(each, doubts), dataset, doubts), detection.frames,
                                          detection.objects)) for name, each in named.items()]  # fmt: skip
     found = _corrected(found)
     if runs is not None:
@@ -191,10 +207,18 @@ def evaluate(
 
 
 def _name_of(results: Results) -> str:
+    if isinstance(results, Query):
+        return Path(results.source.name.strip("<>")).stem
     return Path(results).stem if isinstance(results, Path | str) else "results"
 
 
-def _records(results: Results) -> Iterator[Record]:
+def _records(results: Results, doubts: list[Diagnostic]) -> Iterator[Record]:
+    if isinstance(results, Query):
+        options = replace(results.options, all_matches=True, proofs=True, every=False, limit=None)
+        query = Query(results.dataset, results.source, options, files=results.files)
+        yield from (record(each, every=True) for each in query.results())
+        doubts += query.funnel.warnings
+        return
     if isinstance(results, Path | str):
         yield from read_records(Path(results))
         return
@@ -229,12 +253,13 @@ def _decisive(scenario: ScenarioEvaluation) -> ObjectComparison:
 
 
 def _corrected(found: list[ScenarioEvaluation]) -> list[ScenarioEvaluation]:
-    """With the p-values of all roles of all scenarios corrected together."""
-    corrected = iter(holm(np.array([each.p_value for one in found for each in one.headline])).tolist())
+    """With the p-values of all rows of all scenarios corrected together."""
+    rows = [[*one.roles, one.all_objects] for one in found]
+    corrected = iter(holm(np.array([each.p_value for some in rows for each in some])).tolist())
     done: list[ScenarioEvaluation] = []
-    for one in found:
-        headline = tuple(replace(each, p_corrected=next(corrected)) for each in one.headline)
-        done.append(replace(one, roles=headline) if one.roles else replace(one, all_objects=headline[0]))
+    for one, some in zip(found, rows, strict=True):
+        *roles, of_all = (replace(each, p_corrected=next(corrected)) for each in some)
+        done.append(replace(one, roles=tuple(roles), all_objects=of_all))
     return done
 
 
@@ -246,41 +271,66 @@ def _warnings(found: Iterable[ScenarioEvaluation], detection: Detection) -> Iter
         hint = "a dataset that was made before heights were kept gets them when its source is ingested again"
         yield Diagnostic("heights-unknown", message, severity="warning", hints=(hint,))
     for one in found:
+        if one.one_each and one.roles:
+            message = f"{one.name}: results say one correspondence of each frame; others of it may play a role, too"
+            hint = (
+                "with the program in place of results, or results of `match --all-matches`, who plays none is compared"
+            )
+            yield Diagnostic("one-correspondence", message, severity="warning", hints=(hint,))
+        for name in one.coincident:
+            message = (
+                f"{one.name}: frames that match have values of `{name}` that no other frame has: what is said of all "
+                "objects may be said of that"
+            )
+            yield Diagnostic("parameter-coincides", message, severity="warning")
         for each in one.headline:
             if each.uncounted:
-                whole = each.uncounted + int(each.share.of)
+                whole = each.uncounted + each.asked
                 message = (
                     f"{one.name}: {each.uncounted} of {whole} objects of {each.about} do not count by the rules of "
                     f"{detection.predictions.protocol.name} predictions: too far away, without points in the box, of "
                     "another class, or not where the benchmark looks"
                 )
                 yield Diagnostic("objects-uncounted", message, severity="warning")
-            if each.share.of and each.few:
-                message = (
-                    f"{one.name}: {each.about} tells as much as {each.effective:.1f} equally large recordings would: "
-                    "intervals and tests are rough, and no verdict"
-                )
-                yield Diagnostic("few-recordings", message, severity="warning")
-            if each.alone > 0.2:
+            if each.share.of and each.missing:
+                message = f"{one.name}: no verdict on {each.about}: {each.because}"
+                yield Diagnostic("no-verdict", message, severity="warning")
+            elif each.alone > _ALONE:
                 message = f"{one.name}: {100 * each.alone:.0f} % of {each.about} have no other object that is alike"
-                yield Diagnostic("few-recordings", message, severity="warning")
+                yield Diagnostic("no-verdict", message, severity="warning")
 
 
 class _Judge:
     """Labels and predictions, ready to be divided by scenarios."""
 
-    def __init__(self, detection: Detection, distance_m: float, least: float, rng: np.random.Generator) -> None:
+    def __init__(
+        self, detection: Detection, distance_m: float, least: float, rng: np.random.Generator, margin: float,
+        clusters: Clusters,
+    ) -> None:  # fmt: skip
         self._detection, self._distance, self._least, self._rng = detection, distance_m, least, rng
+        self._margin, self._clusters = margin, clusters
         objects = detection.objects
-        self._recording = detection.frames.recording[objects.frame].astype(np.int64)
         self._counted = detection.object_class >= 0
         score = detection.score[distance_m]
         self._missed = self._counted & ((score < least) | np.isneginf(score))
-        self._weights = resamples(len(detection.frames.recordings), rng)
-        away = np.searchsorted(DISTANCES_M, detection.distance, side="right").astype(np.int64)
-        category = detection.object_class.astype(np.int64)
-        self._class = np.maximum(category, 0)
-        self._alike = strata_of((self._class, away, objects.visible.astype(np.int64)))
+        self._weights = resamples(clusters.count, rng)
+        self._parameters = parameters_of(detection.frames, clusters)
+        category = np.maximum(detection.object_class, 0).astype(np.int64)
+        frame = objects.frame.astype(np.int64)
+        self._like = Likeness(
+            kind=number_of((category, objects.visible.astype(np.int64))),
+            category=category,
+            distance=detection.distance,
+            frame=frame,
+            recording=detection.frames.recording[frame].astype(np.int64),
+            cluster=clusters.number[frame],
+            params=self._combined(self._parameters)[frame],
+        )
+
+    def _combined(self, names: Iterable[str]) -> NDArray[np.int64]:
+        """The number of each frame's combination of parameters."""
+        whole = np.zeros(len(self._detection.frames.names), dtype=np.int64)
+        return number_of((whole, *(self._parameters[name][1] for name in names))) if len(whole) else whole
 
     def scenario(self, matched: Matched) -> ScenarioEvaluation:
         """The figures of one scenario."""
@@ -289,57 +339,83 @@ class _Judge:
         other = matched.decided & ~matched.matching & detection.covered
         frame = detection.objects.frame
         here, there = self._counted & matching[frame], self._counted & other[frame]
-        in_roles = np.zeros(len(frame), dtype=np.bool_)
-        roles: list[ObjectComparison] = []
-        asked: list[tuple[str, Bools]] = []
+        asked: list[tuple[str, Bools, int]] = []
         for role in matched.roles:
             mine = np.zeros(len(frame), dtype=np.bool_)
             mine[role.objects] = True
             uncounted = int((mine & matching[frame] & ~self._counted).sum())
-            mine &= here
-            in_roles |= mine
-            asked.append((f"role {role.name}", mine))
-            others = (here | there) & ~mine & self._of_classes(mine)
-            found = self._compare(f"role {role.name}", mine, others, self._alike)
-            roles.append(replace(found, uncounted=uncounted))
-        of_all = self._compare("all objects", here, there, self._class)
-        mine = in_roles if matched.roles else here
-        others = (here | there) & ~mine & self._of_classes(mine)
+            asked.append((f"role {role.name}", mine & here, uncounted))
+        in_roles = np.logical_or.reduce([mine for _, mine, _ in asked]) if asked else here
+        # who plays any role is no control of another
+        free = there | (here & matched.free[frame] & ~in_roles) if asked else there
+        roles = tuple(
+            replace(self._of_role(about, mine, free), uncounted=uncounted) for about, mine, uncounted in asked
+        )
+        of_all, coincident = self._of_all(here, there)
+        others = free & self._of_classes(in_roles)
         return ScenarioEvaluation(
             name=matched.name,
             matching=int(matching.sum()),
             other=int(other.sum()),
-            roles=tuple(roles),
+            roles=roles,
             all_objects=of_all,
-            weighted=tuple(self._weighted(matched.log_weight, asked or [("all objects", here)])),
+            weighted=tuple(self._weighted(matched.log_weight, [each[:2] for each in asked] or [("all objects", here)])),
             classes=tuple(
                 figures
                 for group, frames in (("matching", matching), ("other", other))
-                for figures in class_figures(detection, group, frames, self._weights, self._least)
+                for figures in class_figures(
+                    detection, group, frames, self._clusters.number, self._weights, self._least
+                )
             ),
-            slices=tuple(slices(detection, matched, self._missed, mine, others, self._weights)),
-            worst=tuple(self._worst(matching, mine)),
+            slices=slices(detection, matched, self._missed, in_roles, others, self._like.cluster),
+            worst=tuple(self._worst(matching, in_roles)),
             simulated=None,
             missed=self._missed,
-            mine=mine,
+            mine=in_roles,
+            coincident=coincident,
+            one_each=not matched.every,
         )
+
+    def _of_role(self, about: str, mine: Bools, free: Bools) -> ObjectComparison:
+        others = free & self._of_classes(mine)
+        found = self._compare(about, mine, others, self._like)
+        if not found.missing or not found.alone:
+            return found
+        only = [name for name in self._parameters if self._coincides(name, mine, others)]
+        told = tuple(f"no other is under the same `{name}`" for name in only)
+        return replace(found, missing=(*found.missing, *told))
+
+    def _of_all(self, here: Bools, there: Bools) -> tuple[ObjectComparison, tuple[str, ...]]:
+        """The comparison of frames, and the parameters that all frames that match have for themselves."""
+        only = tuple(name for name in self._parameters if self._coincides(name, here, there))
+        like = self._like
+        if only:
+            kept = [name for name in self._parameters if name not in only]
+            like = replace(like, params=self._combined(kept)[like.frame])
+        return self._compare("all objects", here, there, like), only
+
+    def _coincides(self, name: str, mine: Bools, others: Bools) -> bool:
+        """Whether objects in question and others have no value of a parameter in common."""
+        value = self._parameters[name][1][self._like.frame]
+        one, other = np.unique(value[mine]), np.unique(value[others])
+        return bool(len(one) and len(other)) and not np.isin(one, other).any()
 
     def _weighted(self, log_weight: Reals | None, asked: Iterable[tuple[str, Bools]]) -> Iterator[Weighted]:
         if log_weight is not None:
             for about, mine in asked:
                 numbers = np.flatnonzero(mine)
                 of_frame = log_weight[self._detection.objects.frame[numbers]]
-                yield weighted(about, self._missed[numbers], of_frame, self._recording[numbers], self._weights)
+                yield weighted(about, self._missed[numbers], of_frame, self._like.cluster[numbers])
 
     def _of_classes(self, mine: Bools) -> Bools:
-        return np.isin(self._class, np.unique(self._class[mine]))
+        return np.isin(self._like.category, np.unique(self._like.category[mine]))
 
-    def _compare(self, about: str, mine: Bools, others: Bools, stratum: NDArray[np.int64]) -> ObjectComparison:
+    def _compare(self, about: str, mine: Bools, others: Bools, like: Likeness) -> ObjectComparison:
         used = np.flatnonzero(mine | others)
-        _, strata = np.unique(stratum[used], return_inverse=True)
         return compare(
-            about, self._missed[used], mine[used], others[used], self._recording[used], strata, self._weights, self._rng
-        )
+            about, self._missed[used], mine[used], others[used], like.taken(used), self._rng,
+            margin=self._margin, unit=self._clusters.unit,
+        )  # fmt: skip
 
     def _worst(self, matching: Bools, mine: Bools) -> Iterator[WorstFrame]:
         detection = self._detection

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.evaluate.annotations import Annotations, Frames
-from scenicq.query.execution.records import FrameRecord, Record
+from scenicq.query.execution.records import FrameRecord, IntervalRecord, Record
 
 __all__ = ["Matched", "Played", "read_matched"]
 
@@ -45,18 +45,27 @@ class Matched:
         name: Of the scenario.
         matching: Frames that match, shape (frames,).
         decided: Frames that match or do not; the others are unknown.
+        settled: Frames of which nothing is unknown: there are no more correspondences than those that are said.
         roles: In the order of their first match; what the recording vehicle plays is left out.
         witness: The values of the random variables by frame, of its first match.
         log_weight: How much each frame counts where frames are to be spread as the program spreads its scenes, nan
             where the results do not say, shape (frames,); None where they say it of none.
+        every: Whether the results say every correspondence of each frame that matches.
     """
 
     name: str
     matching: Bools
     decided: Bools
+    settled: Bools
     roles: tuple[Played, ...]
     witness: Mapping[int, Mapping[str, Any]]
     log_weight: NDArray[np.float64] | None = None
+    every: bool = True
+
+    @property
+    def free(self) -> Bools:
+        """Frames that match in which who is in no role surely can play none, shape (frames,)."""
+        return self.matching & self.settled if self.every else np.zeros(len(self.matching), dtype=np.bool_)
 
 
 def read_matched(name: str, records: Iterable[Record], frames: Frames, objects: Annotations) -> Matched:
@@ -79,7 +88,7 @@ def read_matched(name: str, records: Iterable[Record], frames: Frames, objects: 
     played: dict[str, dict[int, None]] = {}
     witness: dict[int, Mapping[str, Any]] = {}
     log_weight = np.full(len(frames.names), np.nan)
-    ranked = False
+    ranked, every = False, True
     recordings = {recording: number for number, recording in enumerate(frames.recordings)}
     for each in records:
         if each.verdict == "no_match":
@@ -89,6 +98,7 @@ def read_matched(name: str, records: Iterable[Record], frames: Frames, objects: 
             unknown[where] = True
             continue
         matching[where] = True
+        every = every and (isinstance(each, IntervalRecord) or each.all_matches is True)
         if each.log_weight is not UNSET:
             ranked = True
             log_weight[where] = _log_weight(name, each.log_weight)
@@ -110,9 +120,11 @@ def read_matched(name: str, records: Iterable[Record], frames: Frames, objects: 
         name=name,
         matching=matching,
         decided=matching | ~unknown,
+        settled=~unknown,
         roles=tuple(Played(role, np.array(sorted(numbers), dtype=np.int64)) for role, numbers in played.items()),
         witness=witness,
         log_weight=log_weight if ranked else None,
+        every=every,
     )
 
 

@@ -141,6 +141,7 @@ class _Pages:
     def _scenario(self, each: ScenarioEvaluation) -> Iterator[str]:
         counts = f"{each.matching:,} frames match, {each.other:,} do not"
         sentences = [element("p", element("b", escape(role.sentence))) for role in each.headline]
+        sentences += [element("p", escape(one.beside), class_="hint") for one in each.headline if one.asked]
         sentences += [element("p", escape(one.sentence)) for one in each.weighted]
         if each.simulated is not None:
             sentences.append(element("p", escape(each.simulated.sentence)))

@@ -1,31 +1,40 @@
-"""What chance can do: frames of one recording resemble each other, so recordings are resampled, never frames.
+"""What chance can do, over clusters of frames that resemble each other: recordings, or drives of several.
 
-Intervals are percentiles of the bootstrap over recordings, moved outward for few recordings as Student's distribution
-is (Hesterberg 2015, "What teachers should know about the bootstrap", section 5.3). Differences are tested by flipping
-the signs of the recordings' contributions (Hemerik, Goeman and Finos 2020, "Robust testing in generalized linear models
-by sign flipping score contributions").
+A share has the interval of Wilson (1927) at its effective number of objects: how many would vary as much as the share
+varies over clusters (Korn and Graubard 1998, "Confidence intervals for proportions with small expected number of
+positive counts estimated from survey data"), with Student's quantile of as many degrees of freedom as there are
+clusters, less one. A difference of two shares has the interval that theirs make (Newcombe 1998, "Interval estimation
+for the difference between independent proportions", method 10). Differences are tested twice, and the greater p-value
+counts: by flipping the signs of the clusters' contributions (Hemerik, Goeman and Finos 2020, "Robust testing in
+generalized linear models by sign flipping score contributions"), which knows how clusters differ, and by the exact
+test of two counts at their effective numbers, which knows how little few objects and few misses say. Other figures
+have percentiles of the bootstrap over clusters, moved outward for few of them (Hesterberg 2015, "What teachers should
+know about the bootstrap", section 5.3).
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
-    "FEW",
+    "CLUSTERS",
+    "LEVEL",
     "Interval",
-    "StratumCounts",
+    "count_test",
+    "difference_interval",
     "effective_number",
     "holm",
     "interval_of",
-    "rate_interval",
-    "rates",
+    "ratio_interval",
     "resamples",
     "sign_flip_test",
+    "student",
+    "sums_by",
+    "wilson",
 ]
 
 Reals = NDArray[np.float64]
@@ -33,63 +42,36 @@ Interval = tuple[float, float]
 
 RESAMPLES = 2000
 FLIPS = 4999
-FEW = 8.0
-"""Below this effective number of recordings intervals and tests are told to be rough."""
+CLUSTERS = 5.0
+"""Below this effective number of clusters there is no interval."""
+_ALL_FLIPS = 12
+"""Up to so many clusters all flips are made."""
 _AT_ONCE = 250
-"""Flips of all recordings that are drawn at once."""
-_LEVEL = 0.95
+"""Flips of all clusters that are drawn at once."""
+LEVEL = 0.95
+"""How often an interval holds the truth."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class StratumCounts:
-    """Objects in two groups, by recording and stratum (objects that are alike in distance and visibility).
-
-    Attributes:
-        missed, of: Objects of the group in question that were missed, and all of them; shape (recordings, strata).
-        other_missed, other_of: The same for those that it is compared with.
-    """
-
-    missed: Reals
-    of: Reals
-    other_missed: Reals
-    other_of: Reals
-
-    @property
-    def comparable(self) -> NDArray[np.bool_]:
-        """Strata in which there are objects of both groups, shape (strata,)."""
-        return (self.of.sum(axis=0) > 0) & (self.other_of.sum(axis=0) > 0)
-
-
-def resamples(recordings: int, rng: np.random.Generator, count: int = RESAMPLES) -> Reals:
-    """How often each recording is drawn in each resample, shape (count, recordings)."""
-    if recordings == 0:
-        return np.zeros((count, 0))
-    return rng.multinomial(recordings, np.full(recordings, 1.0 / recordings), size=count).astype(np.float64)
-
-
-def rates(counts: StratumCounts, weights: Reals) -> tuple[Reals, Reals]:
-    """The share missed in the group, and among the others if they were spread over the strata as the group is.
+def sums_by(number: NDArray[np.int64], values: Reals | NDArray[np.bool_], count: int = 0) -> Reals:
+    """The sum of the values of each cluster, shape (clusters,).
 
     Args:
-        counts: The objects.
-        weights: How often each recording counts, shape (n, recordings).
-
-    Returns:
-        Two arrays of shape (n,); NaN where a group has no objects.
+        number: Of each value's cluster, shape (n,).
+        values: Shape (n,).
+        count: How many clusters there are at least.
     """
-    of, missed = weights @ counts.of, weights @ counts.missed
-    other_of, other_missed = weights @ counts.other_of, weights @ counts.other_missed
-    with np.errstate(invalid="ignore", divide="ignore"):
-        first = missed.sum(axis=1) / of.sum(axis=1)
-        both = (of > 0) & (other_of > 0)
-        shares = np.where(both, of, 0.0)
-        of_others = np.where(both, other_missed / other_of, 0.0)
-        second = (shares * of_others).sum(axis=1) / shares.sum(axis=1)
-    return first, second
+    return np.bincount(number, weights=values, minlength=count).astype(np.float64)
+
+
+def resamples(clusters: int, rng: np.random.Generator, count: int = RESAMPLES) -> Reals:
+    """How often each cluster is drawn in each resample, shape (count, clusters)."""
+    if clusters == 0:
+        return np.zeros((count, 0))
+    return rng.multinomial(clusters, np.full(clusters, 1.0 / clusters), size=count).astype(np.float64)
 
 
 def effective_number(sizes: Reals) -> float:
-    """The number of equally large recordings that would tell as much as these (Kish), of sizes of shape (n,)."""
+    """The number of equally large clusters that would tell as much as these (Kish), of sizes of shape (n,)."""
     total = float(sizes.sum())
     return total * total / float((sizes * sizes).sum()) if total else 0.0
 
@@ -99,32 +81,23 @@ def interval_of(values: Reals, number: float) -> Interval:
 
     Args:
         values: Shape (n,); those that are not finite are left out.
-        number: The effective number of recordings.
+        number: The effective number of clusters.
     """
     sound = values[np.isfinite(values)]
-    if not len(sound) or number < 2:
+    if not len(sound) or number < CLUSTERS:
         return math.nan, math.nan
-    tail = (1 - _LEVEL) / 2
-    wide = NormalDist().cdf(-_student(1 - tail, number - 1) * math.sqrt(number / (number - 1)))
+    wide = NormalDist().cdf(-student(LEVEL, number) * math.sqrt(number / (number - 1)))
     low, high = np.quantile(sound, (wide, 1 - wide))
     return float(low), float(high)
 
 
-def rate_interval(values: Reals, rate: float, number: float) -> Interval:
-    """The same for a share: where nothing or everything was missed, resamples say nothing, and the binomial does."""
-    if math.isnan(rate) or number < 1:
-        return math.nan, math.nan
-    if rate in (0.0, 1.0):
-        reach = 1 - ((1 - _LEVEL) / 2) ** (1 / number)
-        return (0.0, reach) if rate == 0.0 else (1 - reach, 1.0)
-    low, high = interval_of(values, number)
-    return max(0.0, low), min(1.0, high)
+def student(level: float, clusters: float) -> float:
+    """How many standard errors an interval reaches either way, by Student's distribution.
 
-
-def _student(share: float, freedom: float) -> float:
-    """The quantile of Student's distribution, by its expansion about the normal one; better than 1 % from 3 on."""
-    z = NormalDist().inv_cdf(share)
-    n = max(freedom, 1.0)
+    It is expanded about the normal one: better than 1 % from 3 degrees of freedom on.
+    """
+    z = NormalDist().inv_cdf((1 + level) / 2)
+    n = max(clusters - 1, 1.0)
     return (
         z
         + (z**3 + z) / (4 * n)
@@ -133,24 +106,68 @@ def _student(share: float, freedom: float) -> float:
     )
 
 
-def sign_flip_test(counts: StratumCounts, rng: np.random.Generator, flips: int = FLIPS) -> float:
-    """The probability of a difference as large as this one, were objects of both groups missed alike.
+def wilson(rate: float, number: float, reach: float) -> Interval:
+    """The interval of a share.
 
-    Each recording contributes by how many more objects of the group than of the others it misses than the common rate
-    of the stratum says; without a difference, either sign of a contribution is as likely.
+    Args:
+        rate: The share.
+        number: Of how many independent objects.
+        reach: Standard errors either way.
+    """
+    square = reach * reach / number
+    middle = (rate + square / 2) / (1 + square)
+    half = reach / (1 + square) * math.sqrt(rate * (1 - rate) / number + square / (4 * number))
+    return max(0.0, middle - half), min(1.0, middle + half)
+
+
+def ratio_interval(part: Reals, whole: Reals, objects: float = math.inf, level: float = LEVEL) -> Interval:
+    """The interval of a share of objects in clusters; nan where clusters are too few.
+
+    Args:
+        part: How many there are in each cluster that count, shape (clusters,).
+        whole: How many there are in all.
+        objects: How many independent objects they can be at most.
+        level: How often it holds the truth.
+    """
+    clusters, total = effective_number(whole), float(whole.sum())
+    if clusters < CLUSTERS:
+        return math.nan, math.nan
+    rate = float(part.sum()) / total
+    spread = float(np.square(part - rate * whole).sum()) / total**2 * clusters / (clusters - 1)
+    # where nothing or everything counts, nothing tells how clusters differ: each is one object
+    number = min(objects, rate * (1 - rate) / spread) if spread > 0 else clusters
+    return wilson(rate, number, student(level, clusters))
+
+
+def difference_interval(first: float, second: float, numbers: tuple[float, float], reach: float) -> Interval:
+    """The interval of the first share less the second.
+
+    Args:
+        first: The first share.
+        second: The other.
+        numbers: Of how many independent objects each is.
+        reach: Standard errors either way.
+    """
+    low, high = wilson(first, numbers[0], reach)
+    other_low, other_high = wilson(second, numbers[1], reach)
+    return (
+        first - second - math.hypot(first - low, other_high - second),
+        first - second + math.hypot(high - first, second - other_low),
+    )
+
+
+def sign_flip_test(scores: Reals, rng: np.random.Generator, flips: int = FLIPS) -> float:
+    """The probability that contributions of clusters add up to as much either way, were either sign as likely.
+
+    Args:
+        scores: By how much more objects in question than others each cluster misses, shape (clusters,).
+        rng: Source of randomness, where there are too many clusters for all flips.
+        flips: How many are drawn then.
 
     Returns:
-        A p-value of two sides; NaN where nothing can be compared.
+        A p-value of two sides.
     """
-    use = counts.comparable
-    if not use.any():
-        return math.nan
-    of, missed = counts.of[:, use], counts.missed[:, use]
-    other_of, other_missed = counts.other_of[:, use], counts.other_missed[:, use]
-    common = (missed + other_missed).sum(axis=0) / (of + other_of).sum(axis=0)
-    share = of.sum(axis=0) / other_of.sum(axis=0)
-    scores = ((missed - common * of) - share * (other_missed - common * other_of)).sum(axis=1)
-    scores = scores[scores != 0]
+    scores = scores[np.abs(scores) > 1e-12 * np.abs(scores).max(initial=0.0)]
     if not len(scores):
         return 1.0
 
@@ -160,12 +177,46 @@ def sign_flip_test(counts: StratumCounts, rng: np.random.Generator, flips: int =
         with np.errstate(divide="ignore"):
             return np.abs(flipped) / np.sqrt(spread)
 
-    found = studentised(np.ones((1, len(scores))))[0]
+    found = studentised(np.ones((1, len(scores))))[0] * (1 - 1e-9)
+    if len(scores) <= _ALL_FLIPS:
+        # both signs of all at once come to the same
+        numbers: NDArray[np.int64] = np.arange(2 ** (len(scores) - 1), dtype=np.int64)
+        turned = np.bitwise_and(np.right_shift(numbers[:, None], np.arange(len(scores))), 1)
+        return float(np.count_nonzero(studentised(1.0 - 2.0 * turned) >= found) / len(turned))
     above = 0
     for first in range(0, flips, _AT_ONCE):
         signs = rng.choice((-1.0, 1.0), size=(min(_AT_ONCE, flips - first), len(scores)))
-        above += np.count_nonzero(studentised(signs) >= found * (1 - 1e-12))
+        above += np.count_nonzero(studentised(signs) >= found)
     return float((1 + above) / (1 + flips))
+
+
+def count_test(first: float, second: float, numbers: tuple[float, float]) -> float:
+    """The probability that misses divide among two groups as unevenly by chance, given how many there are in all.
+
+    Fisher's exact test at effective numbers, which are rounded; what is found counts half, as numbers are discrete.
+
+    Args:
+        first: The share missed of one group.
+        second: That of the other.
+        numbers: Of how many independent objects each is.
+
+    Returns:
+        A p-value of two sides.
+    """
+    size, other = (max(1, round(number)) for number in numbers)
+    own = min(size, round(first * size))
+    missed = own + min(other, round(second * other))
+    possible = np.arange(max(0, missed - other), min(size, missed) + 1)
+    logs = np.array([_log_choose(size, k) + _log_choose(other, missed - k) for k in possible.tolist()])
+    chances = np.exp(logs - logs.max())
+    chances /= chances.sum()
+    here = float(chances[possible == own].sum())
+    below, above = float(chances[possible < own].sum()), float(chances[possible > own].sum())
+    return min(1.0, 2 * (min(below, above) + here / 2))
+
+
+def _log_choose(of: int, number: int) -> float:
+    return math.lgamma(of + 1) - math.lgamma(number + 1) - math.lgamma(of - number + 1)
 
 
 def holm(p_values: Reals) -> Reals:

@@ -8,6 +8,7 @@ from typing import Any
 
 from scenicq.evaluate.classes import ClassFigures
 from scenicq.evaluate.comparison import ObjectComparison, Share, p_text
+from scenicq.evaluate.controls import PLACES
 from scenicq.evaluate.evaluation import Evaluation, ScenarioEvaluation
 from scenicq.evaluate.precision import ERRORS
 from scenicq.evaluate.slices import Slice
@@ -37,6 +38,12 @@ COLUMNS: dict[str, type] = {
     "p_value": float,
     "p_corrected": float,
     "recordings": float,
+    "difference": float,
+    "difference_low": float,
+    "difference_high": float,
+    "alone": float,
+    "says": str,
+    "because": str,
 }
 """Columns of the flat table: one row a figure with its interval."""
 
@@ -47,7 +54,8 @@ def _number(value: float) -> float | None:
 
 def _share(share: Share) -> dict[str, Any]:
     low, high = map(_number, share.interval)
-    return {"missed": share.missed, "of": share.of, "rate": _number(share.rate), "low": low, "high": high}
+    told = {"missed": share.missed, "of": share.of, "rate": _number(share.rate), "low": low, "high": high}
+    return told if math.isnan(share.recordings) else told | {"effective_recordings": round(share.recordings, 2)}
 
 
 def _comparison(each: ObjectComparison) -> dict[str, Any]:
@@ -62,8 +70,16 @@ def _comparison(each: ObjectComparison) -> dict[str, Any]:
         "p_corrected": _number(each.p_corrected),
         "recordings": each.recordings,
         "effective_recordings": round(each.effective, 2),
+        "unit": each.unit,
+        "asked": each.asked,
         "alone": each.alone,
         "uncounted": each.uncounted,
+        "controls": dict(zip(PLACES, each.places, strict=True)),
+        "margin": each.margin,
+        "says": each.says,
+        "missing": list(each.missing),
+        "because": each.because,
+        "more_recordings": each.more,
         "sentence": each.sentence,
     }
 
@@ -143,6 +159,8 @@ def flat_rows(evaluation: Evaluation) -> Iterator[dict[str, Any]]:
             yield _row(
                 one.name, table, each.about, measure="missed", **_of(each.share), **_of_others(each.other),
                 p_value=each.p_value, p_corrected=each.p_corrected, recordings=each.effective,
+                difference=each.difference, difference_low=each.interval[0], difference_high=each.interval[1],
+                alone=each.alone, says=each.says, because=each.because,
             )  # fmt: skip
         for part in one.weighted:
             yield _row(
@@ -164,7 +182,10 @@ def flat_rows(evaluation: Evaluation) -> Iterator[dict[str, Any]]:
                 )  # fmt: skip
         for part in one.slices:
             others: Mapping[str, float] = {} if part.other is None else _of_others(part.other)
-            yield _row(one.name, "slices", part.by, part=part.part, measure="missed", **_of(part.share), **others)
+            yield _row(
+                one.name, "slices", part.by, part=part.part, measure="missed", **_of(part.share), **others,
+                recordings=part.share.recordings,
+            )  # fmt: skip
         if one.simulated is not None:
             yield _row(one.name, "simulated", one.simulated.says, measure="failed", **_of(one.simulated.share))
         for worst in one.worst:
@@ -241,16 +262,17 @@ def tables(scenario: ScenarioEvaluation, distance_m: float) -> list[Table]:
             each.by,
             each.part,
             f"{each.share.of:g}",
+            f"{each.share.recordings:.1f}",
             _percent(each.share.rate, each.share.interval),
             "-" if each.other is None else _percent(each.other.rate, each.other.interval),
         )
         for each in scenario.slices
     ]
-    found.append(("slices", ("BY", "PART", "OBJECTS", "MISSED", "OTHERS"), cut))
+    found.append(("slices", ("BY", "PART", "OBJECTS", "RECORDINGS", "MISSED", "OTHERS"), cut))
     return [table for table in found if table[2]]
 
 
-_COMPARED = ("WHAT", "OBJECTS", "MISSED", "OTHERS ALIKE", "P", "CORRECTED", "RECORDINGS")
+_COMPARED = ("WHAT", "OBJECTS", "MISSED", "OTHERS ALIKE", "P", "CORRECTED", "RECORDINGS", "SAYS")
 
 
 def _compared(each: ObjectComparison) -> tuple[str, ...]:
@@ -259,12 +281,13 @@ def _compared(each: ObjectComparison) -> tuple[str, ...]:
 
     return (
         each.about,
-        f"{each.share.of:g}",
+        f"{each.share.of:g}" + (f" of {each.asked}" if each.asked > each.share.of else ""),
         _percent(each.share.rate, each.share.interval),
         _percent(each.other.rate, each.other.interval),
         shown(each.p_value),
         shown(each.p_corrected),
         f"{each.recordings}" + (f" (as {each.effective:.1f})" if each.effective < each.recordings - 0.05 else ""),
+        each.says,
     )
 
 

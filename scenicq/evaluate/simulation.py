@@ -4,24 +4,21 @@ from __future__ import annotations
 
 import csv
 import io
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.errors import DataError, Diagnostic
-from scenicq.evaluate.comparison import ObjectComparison, Share
-from scenicq.evaluate.resampling import rate_interval, resamples
+from scenicq.evaluate.comparison import ObjectComparison, Says, Share, percent
+from scenicq.evaluate.resampling import ratio_interval
 
 __all__ = ["Simulated", "read_simulated", "verdict"]
 
 _WORDS = {"1": 1.0, "0": 0.0, "true": 1.0, "false": 0.0, "yes": 1.0, "no": 0.0}
-_RUNS = 100_000
-"""Runs of a scenario that are resampled, at most; the mean of more is as good as normally distributed."""
+_SAYS: Mapping[Says, str] = {"worse": "for", "better": "against", "no worse": "against", "too little": "too little"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,13 +38,12 @@ class Simulated:
     sentence: str
 
 
-def read_simulated(path: Path, seed: int = 0) -> Mapping[str, Share]:
+def read_simulated(path: Path) -> Mapping[str, Share]:
     """The failure rate of each scenario in a CSV file of runs.
 
     Args:
         path: With the columns `scenario`, and `failed` (1 or 0, true or false) or `score` (the share missed in that
             run, from 0 to 1).
-        seed: Seed of the resamples.
 
     Raises:
         DataError: file-missing or file-invalid.
@@ -71,7 +67,7 @@ def read_simulated(path: Path, seed: int = 0) -> Mapping[str, Share]:
             runs.setdefault(row["scenario"], []).append(value)
     except csv.Error as error:
         raise _invalid(path, f"line {rows.line_num}: {error}") from None
-    return {name: _share(np.array(values), seed) for name, values in runs.items()}
+    return {name: _share(np.array(values)) for name, values in runs.items()}
 
 
 def _invalid(path: Path, why: str) -> DataError:
@@ -88,38 +84,26 @@ def _value(text: str, column: str) -> float | None:
     return value if 0 <= value <= 1 else None
 
 
-def _share(values: NDArray[np.float64], seed: int) -> Share:
+def _share(values: NDArray[np.float64]) -> Share:
     number, rate = float(len(values)), float(values.mean())
-    if number > _RUNS:
-        reach = NormalDist().inv_cdf(0.975) * float(values.std()) / math.sqrt(number)
-        return Share(float(values.sum()), number, rate, (max(0.0, rate - reach), min(1.0, rate + reach)))
-    count = max(1, min(2000, 20_000_000 // len(values)))
-    drawn = resamples(len(values), np.random.default_rng(seed), count) @ values / number
-    return Share(float(values.sum()), number, rate, rate_interval(drawn, rate, number))
+    return Share(float(values.sum()), number, rate, ratio_interval(values, np.ones(len(values))), number)
 
 
 def verdict(share: Share, real: ObjectComparison) -> Simulated:
     """Whether recordings bear out what was simulated.
 
     They speak for it where objects in question are missed more often than others that are alike (p < 0.05), against it
-    where they are not and are missed clearly less often than in simulation.
+    where they are not missed more often by the margin: a low rate alone is no evidence.
 
     Args:
         share: Of the simulated runs that failed.
         real: The comparison on recordings.
     """
-    p_value = real.p_value if math.isnan(real.p_corrected) else real.p_corrected
-    more = p_value < 0.05 and real.difference > 0
-    less = real.share.interval[1] < share.interval[0]
-    if real.few or math.isnan(real.difference) or not (more or less):
-        says = "too little"
-    else:
-        says = "for" if more else "against"
+    says = _SAYS[real.says]
     words = {
         "for": "the recordings speak for the failure",
         "against": "the recordings speak against the failure",
         "too little": "the recordings say too little",
     }[says]
-    low, high = share.interval
-    text = f"failed in {100 * share.rate:.0f} % [{100 * low:.0f}, {100 * high:.0f}] of {share.of:g} simulated runs; "
-    return Simulated(share, real.about, says, text + f"{real.sentence}: {words}")
+    failed = f"failed in {percent(share)} of {share.of:g} simulated runs; "
+    return Simulated(share, real.about, says, failed + f"{real.sentence}: {words}")

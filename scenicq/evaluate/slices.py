@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from scenicq.evaluate.comparison import DISTANCES_M, Share, distance_names, share_of
 from scenicq.evaluate.detection import Detection
 from scenicq.evaluate.matched import Matched
+from scenicq.evaluate.resampling import LEVEL
 
 __all__ = ["Slice", "slices"]
 
-Reals = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 Numbers = NDArray[np.int64]
 _Pair = Sequence[Any]
@@ -46,9 +46,9 @@ class Slice:
 
 
 def slices(
-    detection: Detection, matched: Matched, missed: Bools, mine: Bools, others: Bools, weights: Reals
-) -> Iterator[Slice]:
-    """All slices with at least two parts.
+    detection: Detection, matched: Matched, missed: Bools, mine: Bools, others: Bools, cluster: Numbers
+) -> tuple[Slice, ...]:
+    """All slices with at least two parts, whose intervals hold all together in 95 % (Bonferroni).
 
     Args:
         detection: Labels and predictions.
@@ -56,21 +56,36 @@ def slices(
         missed: Whether each label object was missed, shape (objects,).
         mine: The objects in question.
         others: Those that they are compared with.
-        weights: How often each recording counts in each resample, shape (resamples, recordings).
+        cluster: Number of each object's cluster.
     """
+    parts = list(_parts_of(detection, matched, mine))
+    level = 1 - (1 - LEVEL) / max(len(parts), 1)
+    return tuple(
+        Slice(
+            by,
+            name,
+            share_of(missed, mine & of, cluster, level),
+            share_of(missed, others & of, cluster, level) if others_too else None,
+        )
+        for by, name, of, others_too in parts
+    )
+
+
+def _parts_of(detection: Detection, matched: Matched, mine: Bools) -> Iterator[tuple[str, str, Bools, bool]]:
+    """What divides the objects, the name of each part, which objects are of it, and whether others may be."""
     objects, frames = detection.objects, detection.frames
     recording = frames.recording[objects.frame].astype(np.int64)
 
-    def told(by: str, names: Sequence[str], part: Numbers, *, others_too: bool = True) -> Iterator[Slice]:
+    def told(
+        by: str, names: Sequence[str], part: Numbers, *, others_too: bool = True
+    ) -> Iterator[tuple[str, str, Bools, bool]]:
         """Slices by the number of each object's part, -1 for none."""
         there = [number for number in range(len(names)) if (mine & (part == number)).any()]
         # what differs between any two recordings, as their names do, is no slice
         shared = any(len(np.unique(recording[mine & (part == number)])) > 1 for number in there)
         if len(there) > 1 and shared:
             for number in there:
-                of = part == number
-                other = share_of(missed, others & of, recording, weights) if others_too else None
-                yield Slice(by, names[number], share_of(missed, mine & of, recording, weights), other)
+                yield by, names[number], part == number, others_too
 
     distance = np.searchsorted(DISTANCES_M, detection.distance, side="right")
     yield from told("distance", distance_names(), distance)

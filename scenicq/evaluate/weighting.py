@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.evaluate.comparison import Share, percent
-from scenicq.evaluate.resampling import FEW, effective_number, rate_interval
+from scenicq.evaluate.resampling import CLUSTERS, effective_number, ratio_interval, sums_by
 
 __all__ = ["Weighted", "log_weights", "weighted"]
 
@@ -102,28 +102,22 @@ class Weighted:
         text += f"; {self.objects} objects tell as much as {self.equal:.0f} of one weight"
         if self.left_out:
             text += f", {self.left_out} without a density are left out"
-        return text + (": too few recordings for a verdict" if self.recordings < FEW else "")
+        return text + (": too few recordings for a verdict" if self.recordings < CLUSTERS else "")
 
 
-def weighted(about: str, missed: Bools, log_weight: Reals, recording: NDArray[np.int64], weights: Reals) -> Weighted:
+def weighted(about: str, missed: Bools, log_weight: Reals, cluster: NDArray[np.int64]) -> Weighted:
     """The share of some objects that was missed, each counting by its weight.
 
     Args:
         about: Which objects.
         missed: Whether each was missed, shape (n,).
         log_weight: Logarithm of the weight of each, nan without, shape (n,).
-        recording: Number of the recording of each, shape (n,).
-        weights: How often each recording counts in each resample, shape (resamples, recordings).
+        cluster: Number of the cluster of each, shape (n,).
     """
     known = ~np.isnan(log_weight)
-    missed, recording, weight = missed[known], recording[known], np.exp(log_weight[known])
-    recordings = weights.shape[1]
-    of = np.bincount(recording, weights=weight, minlength=recordings).astype(np.float64)
-    lost = np.bincount(recording, weights=weight * missed, minlength=recordings).astype(np.float64)
-    total = float(of.sum())
+    missed, cluster, weight = missed[known], cluster[known], np.exp(log_weight[known])
+    of, lost = sums_by(cluster, weight), sums_by(cluster, weight * missed)
+    total, number, equal = float(of.sum()), effective_number(of), effective_number(weight)
     rate = float(lost.sum()) / total if total else math.nan
-    with np.errstate(invalid="ignore", divide="ignore"):
-        resampled = (weights @ lost) / (weights @ of)
-    number = effective_number(of)
-    share = Share(float(lost.sum()), total, rate, rate_interval(resampled, rate, number))
-    return Weighted(about, share, len(weight), int((~known).sum()), effective_number(weight), number)
+    share = Share(float(lost.sum()), total, rate, ratio_interval(lost, of, equal), number)
+    return Weighted(about, share, len(weight), int((~known).sum()), equal, number)

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from scenicq.errors import render
+from scenicq.evaluate.comparison import MARGIN
 from scenicq.evaluate.detection import Missing
 from scenicq.evaluate.evaluation import evaluate
 from scenicq.lint.program import lint_query
@@ -109,7 +110,9 @@ class FrameResult(_Origin):
     @property
     def record(self) -> Mapping[str, Any]:
         """The values that a line of `scenicq match --format jsonl` has."""
-        return json.loads(json_text(record(self.result, self.matches.origin)))
+        return json.loads(
+            json_text(record(self.result, self.matches.origin, every=self.matches.query.options.all_matches))
+        )
 
     def explain(self) -> DisplayedText:
         """Why the frame or interval matches, or what keeps it from it."""
@@ -225,8 +228,9 @@ class Matches(Sequence[FrameResult]):
 
     def to_arrow(self) -> pa.Table:
         """The results as an Arrow table with a field a role, as `-o FILE.parquet` has it."""
-        schema = result_schema(self.query.roles(), origin=self.origin, over_time=self.query.is_over_time())
-        return result_table((record(each.result) for each in self._all()), schema)
+        every = self.query.options.all_matches
+        schema = result_schema(self.query.roles(), origin=self.origin, over_time=self.query.is_over_time(), every=every)
+        return result_table((record(each.result, every=every) for each in self._all()), schema)
 
     def to_pandas(self) -> Any:
         """The results as a data frame; pandas is to be installed."""
@@ -294,6 +298,8 @@ class Matches(Sequence[FrameResult]):
         least_score: float | None = None,
         missing: Missing = "error",
         simulated: str | Path | None = None,
+        cluster: str | None = None,
+        margin: float = MARGIN,
         seed: int = 0,
     ) -> Judgement:
         """Say whether a model fails on the frames that match.
@@ -304,6 +310,8 @@ class Matches(Sequence[FrameResult]):
             least_score: Score from which a prediction counts; all by default.
             missing: What a frame without predictions is; see `scenicq.evaluate.evaluation.evaluate`.
             simulated: A CSV file of simulated runs.
+            cluster: The parameter whose values recordings of one cluster share, or `recording`.
+            margin: What is missed more often by less than this share counts as no worse.
             seed: The same figures come from the same seed.
 
         Raises:
@@ -311,9 +319,10 @@ class Matches(Sequence[FrameResult]):
                 score, or another word for `missing`.
         """
         name = Path(self.query.source.name.strip("<>")).stem
-        results = {name: [each.result for each in self._all()]}
-        judged = evaluate(results, self.query.dataset, predictions, distance_m=distance_m, least_score=least_score,
-                          missing=missing, simulated=simulated, seed=seed)  # fmt: skip
+        judged = evaluate(
+            {name: self.query}, self.query.dataset, predictions, distance_m=distance_m, least_score=least_score,
+            missing=missing, simulated=simulated, cluster=cluster, margin=margin, seed=seed,
+        )  # fmt: skip
         return Judgement(judged, self.query.dataset)
 
     def __repr__(self) -> str:

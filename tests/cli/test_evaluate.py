@@ -29,7 +29,7 @@ def judge(run, parked):
     results = folder / "parked_car.jsonl"
     if not results.exists():
         assert (
-            run("match", str(source / "parked_car.scenic"), str(folder / "street"), "-o", str(results)).exit_code == 0
+            run("match", source / "parked_car.scenic", folder / "street", "--all-matches", "-o", results).exit_code == 0
         )
 
     def call(*more, predictions="predictions.jsonl", files=(results,)):
@@ -45,7 +45,7 @@ def test_table(judge, parked):
     last = done.stdout.rstrip().splitlines()[-2:]
     assert last[0].startswith("missed ")
     assert " of role parkedCar against " in last[0]
-    assert last[0].endswith("over 16 recordings")
+    assert last[0].endswith("over 16 recordings: worse than others that are alike")
     assert last[1].endswith("the recordings speak for the failure")
 
 
@@ -91,6 +91,57 @@ def test_ranked_matches(run, parked, tmp_path):
     assert [row["log_density"] for row in rows] == ["" if log is None else str(log) for log in logs]
     assert pq.read_table(tmp_path / "a.parquet")["log_density"].to_pylist() == logs
     assert run(*words, "--format", "table").exit_code == 0
+
+
+def test_matches_without_a_density_are_told(run, parked, tmp_path):
+    """A square is no density that can be told: in the table and on standard error."""
+    program = tmp_path / "square.scenic"
+    text = (parked[0] / "parked_car.scenic").read_text()
+    program.write_text(text.replace("gap = Range(4, 20)", "half = Range(1, 4)\ngap = half * half + 4"))
+    done = run("match", program, parked[1] / "street", "--rank", "--format", "table")
+    count = sum("no density (" in line for line in done.stdout.splitlines())
+    assert count > 20
+    assert f"warning[no-density]: {count} of {count} matches have no density and come last: `position`" in done.stderr
+    of_lines = [json.loads(line) for line in run("match", program, parked[1] / "street", "--rank").stdout.splitlines()]
+    assert {each["log_density"] for each in of_lines} == {None}
+    assert all("solved" in each["no_density"] for each in of_lines)
+
+
+def test_a_program_is_matched_with_all_who_can_play_a_role(run, parked, tmp_path):
+    source, folder = parked
+    words = [folder / "street", "--predictions", source / "predictions.jsonl", "--format", "json"]
+    file = tmp_path / "parked_car.csv"
+    for name in ("csv", "parquet", "jsonl"):
+        file = tmp_path / f"parked_car.{name}"
+        run("match", source / "parked_car.scenic", folder / "street", "--all-matches", "-o", file)
+        of_file = run("evaluate", file, *words)
+        assert of_file.exit_code == 0, of_file.output
+        assert of_file.stdout == run("evaluate", source / "parked_car.scenic", *words).stdout
+    one_each = tmp_path / "one_each.jsonl"
+    run("match", source / "parked_car.scenic", folder / "street", "-o", one_each)
+    done = run("evaluate", one_each, *words)
+    assert "[one-correspondence]" in done.stderr
+    (role,) = json.loads(done.stdout)["scenarios"][0]["roles"]
+    assert role["controls"]["frame"] == 0
+
+
+def test_clusters_and_margins(run, judge, tmp_path):
+    def role(*words):
+        done = judge(*words, "--format", "json")
+        assert done.exit_code == 0, done.output
+        return json.loads(done.stdout)["scenarios"][0]["roles"][0]
+
+    by_weather = role("--cluster", "weather")
+    assert by_weather["unit"] == "weather"
+    assert by_weather["says"] == "too little"
+    assert by_weather["missed"]["low"] is None
+    assert "equally large weathers would tell" in by_weather["because"]
+    assert role("--cluster", "recording")["unit"] == "recording"
+    assert role("--margin", "0.2")["margin"] == 0.2
+    done = judge("--cluster", "drive")
+    assert done.exit_code == 2
+    assert "no frame has a parameter `drive`" in done.stderr
+    assert "it may be recording, weather" in done.stderr
 
 
 def test_samples_of_matches(run, parked):

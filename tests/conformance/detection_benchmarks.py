@@ -79,7 +79,8 @@ def ours(dataset: Dataset, file: Path, *, everywhere: bool = False) -> Figures:
     detection = detect(dataset, predictions, "skip")
     weights = np.ones((2, len(detection.frames.recordings)))
     found: dict[str, dict[str, float]] = {}
-    for each in class_figures(detection, "all", detection.covered, weights, -math.inf):
+    recording = detection.frames.recording.astype(np.int64)
+    for each in class_figures(detection, "all", detection.covered, recording, weights, -math.inf):
         mine = found.setdefault(each.category, {})
         mine[f"{each.distance_m:g}"] = each.average_precision[0]
         mine |= {name: value for name, (value, _) in each.errors.items()}

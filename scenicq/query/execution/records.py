@@ -70,6 +70,7 @@ class FrameRecord(Struct, frozen=True, kw_only=True):
         sensors: The sensor file of each channel.
         log_density, log_density_error, log_weight, no_density: How typical the label is, as
             `scenicq.query.execution.results.LogDensity` has it; absent where that was not asked for.
+        all_matches: Whether the file has every correspondence by which the frame matches; absent where it has one.
         dataset: The dataset and its version; absent where it is not known.
     """
 
@@ -85,6 +86,7 @@ class FrameRecord(Struct, frozen=True, kw_only=True):
     log_density_error: float | UnsetType | None = UNSET
     log_weight: float | UnsetType | None = UNSET
     no_density: str | UnsetType | None = UNSET
+    all_matches: bool | UnsetType = UNSET
     dataset: str | UnsetType = UNSET
 
     @property
@@ -164,12 +166,13 @@ def record_of(values: Mapping[str, Any]) -> Record:
     return msgspec.convert(values, _kind(values), strict=False)
 
 
-def record(result: Result, dataset: str = "") -> Record:
+def record(result: Result, dataset: str = "", *, every: bool = False) -> Record:
     """A result as it is written.
 
     Args:
         result: The result.
         dataset: The dataset, as `scenicq.query.execution.result_origin.name_origin` says it; "" where it is not known.
+        every: Whether each correspondence by which a frame matches is a result.
     """
     verdict, span = result.verdict, result.interval
     witness: dict[str, Any] = {}
@@ -186,7 +189,8 @@ def record(result: Result, dataset: str = "") -> Record:
     if span is None:
         return FrameRecord(frame=result.frame, recording=result.recording, timestamp_us=result.timestamp_us,
                            verdict=name, correspondence=_dict(roles), witness=witness, cause=cause,
-                           sensors=_dict(result.sensors), dataset=origin, **more)  # fmt: skip
+                           sensors=_dict(result.sensors), all_matches=every or UNSET, dataset=origin,
+                           **more)  # fmt: skip
     frames = FramesRecord(result.frame, span.last, span.count)
     return IntervalRecord(recording=result.recording, start_us=result.timestamp_us, end_us=span.end_us, frames=frames,
                           verdict=name, correspondence=_dict(roles), witness=witness, cause=cause,

@@ -43,7 +43,7 @@ def roles_of(records: Iterable[Record]) -> tuple[str, ...]:
 
 
 def result_schema(
-    roles: Sequence[str], *, origin: str = "", ranked: bool = False, over_time: bool = False
+    roles: Sequence[str], *, origin: str = "", ranked: bool = False, over_time: bool = False, every: bool = False
 ) -> pa.Schema:
     """The columns of results.
 
@@ -52,8 +52,9 @@ def result_schema(
         origin: The dataset that they come from, as `name_origin` says it; "" where it is not known.
         ranked: Whether results have a density.
         over_time: Whether the results are intervals.
+        every: Whether each correspondence by which a frame matches is a result.
     """
-    left_out = {"dataset", *(() if ranked else DENSITY)}
+    left_out = {"dataset", *(() if ranked else DENSITY), *(() if every else ("all_matches",))}
     columns = [
         (each.name, pa.struct([(role, pa.string()) for role in roles]))
         if each.name == "correspondence"

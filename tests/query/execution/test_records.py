@@ -56,13 +56,14 @@ def test_a_line_says_all_and_is_read_back(result, dataset):
 
 
 @given(results.filter(lambda each: not CONTROL.search(repr(each))))
+@pytest.mark.parametrize("every", [False, True])
 @pytest.mark.parametrize("form", ["jsonl", "csv", "spreadsheet", "parquet"])
-def test_every_format_is_read_back(tmp_path_factory, form, result):
-    told = record(result, "town@1")
+def test_every_format_is_read_back(tmp_path_factory, form, every, result):
+    told = record(result, "town@1", every=every)
     ranked, over_time = result.density is not None, result.interval is not None
     sink = io.BytesIO()
     roles = lambda: roles_of([told])  # noqa: E731
-    writer = make_writer(form, sink, roles, origin="town@1", ranked=ranked, over_time=over_time)
+    writer = make_writer(form, sink, roles, origin="town@1", ranked=ranked, over_time=over_time, every=every)
     writer.write(told)
     writer.finish()
     file = tmp_path_factory.mktemp("r") / f"r.{'csv' if form == 'spreadsheet' else form}"
@@ -74,7 +75,7 @@ def test_every_format_is_read_back(tmp_path_factory, form, result):
 
 
 def test_the_columns_are_the_fields():
-    schema = result_schema(("ego", "car"), ranked=True)
+    schema = result_schema(("ego", "car"), ranked=True, every=True)
     assert schema.names == [name for name in FrameRecord.__struct_fields__ if name != "dataset"]
     assert str(schema.field("witness").type) == "map<string, list<item: double>>"
     assert str(schema.field("cause").type) == "struct<what: string, detail: string, place: string, reason: string>"
