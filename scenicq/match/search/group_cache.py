@@ -24,7 +24,7 @@ from scenicq.match.problem.likely_values import likely_group
 from scenicq.match.problem.map_lookups import MapLookups
 from scenicq.match.problem.outcome import UNOBSERVED, Outcome, Patience, Refuted, Satisfied, Search, Steps, Undecided
 from scenicq.match.problem.radius import within_radius
-from scenicq.match.search.choice_search import Ask, AtLast, search_choices
+from scenicq.match.search.choice_search import AtLast, search_choices
 from scenicq.match.search.group_plan import GroupPlan
 
 if TYPE_CHECKING:  # takes long to load
