@@ -28,7 +28,6 @@ NO_LIMITS = {
     "query/explain/nearest_miss.py": "MOST_M: how far `--near` looks",
     "query/explain/violations.py": "_LONGEST_NAME: a name that is shown",
     "query/prefilter/executor.py": "_FEWEST_FRAMES, _MOST_FRAMES, _MOST_NAMED: sizes of blocks",
-    "smt/answer_cache.py": "MOST: answers that are remembered",
     "smt/smtlib.py": "_LONGEST: nesting beyond which a part has a name",
     "store/arrays.py": "FEW, MOST_BYTES: how an array is made",
     "store/camera_rows.py": "LARGEST_IMAGE: what an image may be",
