@@ -255,7 +255,7 @@ def _fast(node: ast.SyntaxNode) -> Iterator[Diagnostic]:
         case ast.ComparisonChain():
             sides = [node.left, *(each.right for each in node.comparisons if each.operator in _ORDERS)]
             if any(isinstance(side, ast.Attribute) and side.name == "speed" for side in sides):
-                places = sides
+                places += sides
         case _:
             pass
     for place in places:
