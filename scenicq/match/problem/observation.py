@@ -19,7 +19,7 @@ IN_COLUMNS = frozenset({
 
 def observe(label_object: LabelObject) -> Mapping[str, Value]:
     """The properties that a label object has, by Scenic's names; what the source lacks is left out."""
-    seen: dict[str, Value] = {"position": (label_object.x, label_object.y)}
+    seen: dict[str, Value] = {"position": (float(label_object.x), float(label_object.y))}
     # one by one: all objects of all labels come here
     if label_object.heading is not None:
         seen["heading"] = float(label_object.heading)
@@ -37,9 +37,9 @@ def observe(label_object: LabelObject) -> Mapping[str, Value]:
         seen["speed"] = math.hypot(*velocity)
     if motion is not None:
         if motion.acceleration is not None:
-            seen["acceleration"] = motion.acceleration
+            seen["acceleration"] = float(motion.acceleration)
         if motion.yaw_rate is not None:
-            seen["angularSpeed"] = motion.yaw_rate
+            seen["angularSpeed"] = float(motion.yaw_rate)
     for name, value in label_object.attributes.items():
         if name not in IN_COLUMNS:
             seen[name] = value if isinstance(value, str | bool) else float(value)

@@ -367,7 +367,8 @@ def _column(
         return _numeric([row.observed(number)[name] for row, number in playing])
     objects = [_label_object(row.label, number) for row, number in playing]
     if name == "position":
-        return np.array([each.x for each in objects]), np.array([each.y for each in objects])
+        x, y = np.array([(each.x, each.y) for each in objects], dtype=np.float64).reshape(-1, 2).T
+        return x, y
     return np.array([getattr(each, name) for each in objects], dtype=np.float64)
 
 

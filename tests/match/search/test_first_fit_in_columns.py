@@ -175,3 +175,29 @@ def test_columns_are_what_numbers_are(rows):
     cosines, sines = turned(values)
     assert [*zip(cosines.tolist(), sines.tolist(), strict=True)] == [turned(float(value)) for value in values]
     assert math.cos(rows[0][0]) == cosines[0]
+
+
+@pytest.mark.parametrize("name", sorted(CASES))
+def test_whole_numbers_of_a_label_are_numbers(name):
+    """Whoever makes labels in Python writes `x=3`, too."""
+    scenario = compiled(HEADER + CASES[name], STREET)
+    matcher = Matcher(scenario, MatchOptions(tolerance=Tolerance(position=1.0, heading=0.6)))
+
+    def rounded(each, number):
+        size = {"width": number(2), "length": number(4)}
+        return replace(
+            each, x=number(round(each.x)), y=number(round(each.y)), heading=number(round(each.heading)), **size
+        )
+
+    made = list(labels(scenario, range(4)))
+    one, other = (
+        [replace(each, ego=rounded(each.ego, number), objects=tuple(rounded(one, number) for one in each.objects))
+         for each in made]
+        for number in (int, float)
+    )  # fmt: skip
+    told: list[list[object]] = []
+    for some in (one, other):
+        verdicts = matcher.match_all(with_candidates(scenario, matcher.options, some))
+        told.append([(type(each), getattr(each, "witness", None)) for each in verdicts])
+    assert told[0] == told[1]
+    assert [(type(each := matcher.match(label)), getattr(each, "witness", None)) for label in one] == told[0]
