@@ -300,7 +300,8 @@ def _nearest_within(region: Region, x: float, y: float, reach: float) -> XY | No
     # no point of a term is closer than its clip, which takes far less time to tell
     away = shapes.distances(shapes.array([term.clip for term in near]), shapes.point(x, y))
     best: XY | None = None
-    for number in np.argsort(away, kind="stable").tolist():
+    order: list[int] = np.argsort(away, kind="stable").tolist()
+    for number in order:
         if best is not None and away[number] >= math.dist(best, (x, y)):
             break
         found = closest_point(near[number], x, y)
