@@ -75,7 +75,7 @@ class NuScenes:
             facts={
                 "ego_size_m": dict(zip(("width", "length", "height"), EGO_SIZE_M, strict=True)),
                 "ego_centre_ahead_of_rear_axle_m": AXLE_TO_CENTRE_M,
-                "ego_pose": f"of the {POSE_CHANNEL} key frame",
+                "ego_pose": f"of the {POSE_CHANNEL} key frame, else of the one nearest in time",
                 "time": "minutes since local midnight, where the name of the log has the time zone",
                 "velocity": f"central differences over steps of at most {LONGEST_STEP_US / 1e6} s",
             },

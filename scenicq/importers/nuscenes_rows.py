@@ -6,12 +6,13 @@ field is not one of these, are for `json`, and for what tells what is wrong with
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any, TypeAlias
 
-from msgspec import Meta, Raw, Struct
-from msgspec.json import Decoder
+from msgspec import DecodeError, Meta, Raw, Struct
+from msgspec.json import Decoder, decode
 
-__all__ = ["ANNOTATIONS", "EGO_POSES", "SENSOR_FILES", "Annotation", "EgoPose", "SensorFile"]
+__all__ = ["ANNOTATIONS", "EGO_POSES", "SENSOR_FILES", "Annotation", "EgoPose", "SensorFile", "moment"]
 
 _Text: TypeAlias = Annotated[str, Meta(min_length=1)]
 _Length: TypeAlias = Annotated[float, Meta(gt=0)]
@@ -81,6 +82,16 @@ class EgoPose(_Row):
     translation: Annotated[list[float], Meta(min_length=3, max_length=3)]
     rotation: Annotated[list[float], Meta(min_length=4, max_length=4)]
     timestamp: Raw = _NOTHING
+
+
+def moment(value: object) -> float:
+    """The `timestamp` of a row, in microseconds; inf where it is none."""
+    try:
+        known = decode(value) if isinstance(value, Raw) else value
+        found = float(known) if isinstance(known, int | float) and not isinstance(known, bool) else math.inf
+    except (DecodeError, OverflowError):
+        return math.inf
+    return found if math.isfinite(found) else math.inf
 
 
 ANNOTATIONS = Decoder(list[Annotation])

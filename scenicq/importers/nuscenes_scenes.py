@@ -39,7 +39,7 @@ LONGEST_STEP_US = 1_500_000
 """Over longer gaps than this a difference of positions says little about velocity."""
 
 POSE_CHANNEL = "LIDAR_TOP"
-"""The sensor whose ego pose is that of the sample."""
+"""The sensor whose ego pose is that of the sample; without it, it is that of the key frame nearest in time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,7 +115,7 @@ class SceneReader:
         for scene in self.scenes:
             for instant in scene.instants:
                 if instant.pose is None:
-                    message = f"{instant.place}: sample `{instant.token}` has no sound {POSE_CHANNEL} pose"
+                    message = f"{instant.place}: sample `{instant.token}` has no sound ego pose"
                     report.left_out("label", "record-invalid", message)
             columns = _columns(scene, classes)
             ids = set(columns.objects.id)

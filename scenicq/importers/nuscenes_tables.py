@@ -21,7 +21,7 @@ from scenicq.importers.cameras import pose_of as vehicle_pose
 from scenicq.importers.fields import InvalidError, Record
 from scenicq.importers.json_tables import ElementBlock, Rows, read_list
 from scenicq.importers.nuscenes_boxes import Box, Boxes, BoxReader, found, joined, of_rows, pose
-from scenicq.importers.nuscenes_rows import ANNOTATIONS, EGO_POSES, SENSOR_FILES
+from scenicq.importers.nuscenes_rows import ANNOTATIONS, EGO_POSES, SENSOR_FILES, moment
 from scenicq.importers.nuscenes_scenes import POSE_CHANNEL, Instant, SceneContent
 from scenicq.importers.recording_checks import tell_order
 from scenicq.importers.report import Report
@@ -176,6 +176,7 @@ class Tables:
             if of is not None:
                 mounted[token] = _Mounted(of, self._try("camera", place, lambda row=row: _mount(row), name))
         pose_of: dict[str, str] = {}
+        nearest: dict[str, tuple[float, str, str]] = {}
         images: defaultdict[str, list[_Image]] = defaultdict(list)
         sweeps = strays = 0
         for token, row, place in self._rows("sample_data", "sensor file", SENSOR_FILES):
@@ -191,6 +192,10 @@ class Tables:
                 self.sensors[sample][sensor.channel] = fields.text(row, "filename"), None
                 if sensor.channel == POSE_CHANNEL:
                     pose_of[sample] = fields.text(row, "ego_pose_token")
+                elif sample not in pose_of:
+                    away = abs(moment(row.get("timestamp")) - self.samples[sample][1].time)
+                    other = (away, sensor.channel, fields.text(row, "ego_pose_token"))
+                    nearest[sample] = min(other, nearest.get(sample, other))
                 width, height = (pixels if type(pixels) is int else 0 for pixels in size)
                 if sensor.mount is not None and width > 0 and height > 0:
                     images[fields.text(row, "ego_pose_token")].append(_Image(sample, sensor, width, height))
@@ -198,6 +203,13 @@ class Tables:
             self._try("sensor file", place, add, f"sample_data `{token}`")
         self._report.not_read("sample_data/sweeps", sweeps)
         self._report.not_read("sample_data of samples that are not there", strays)
+        for sample, (_, _, token) in nearest.items():
+            if sample not in pose_of:
+                pose_of[sample] = token
+                message = (
+                    f"no sound key frame of {POSE_CHANNEL}: the ego is where it was at the key frame nearest in time"
+                )
+                self._report.assumed("sample", "ego pose", message)
         wanted = {*pose_of.values(), *images}
         poses: dict[str, tuple[float, float, float, float]] = {}
         for token, row, place in self._rows("ego_pose", "ego pose", EGO_POSES):

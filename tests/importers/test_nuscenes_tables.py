@@ -115,3 +115,35 @@ def test_times_as_floats(share: float, told: bool, tmp_path: Path) -> None:
     found = sorted(label.timestamp_us for label in open_dataset(tmp_path / "d").labels())
     assert found == sorted(time + round(share) for time in whole)
     assert any(entry.name == "rounded times" for entry in summary.left_out) == told
+
+
+@pytest.mark.parametrize("as_records", [False, True])
+def test_without_a_lidar_the_ego_is_where_it_was_at_the_nearest_key_frame(as_records: bool, tmp_path: Path) -> None:
+    source = Path(shutil.copytree(TINY.parent, tmp_path / "source"))
+    ingest(source, tmp_path / "before")
+    (folder,) = source.glob("v1.0-*")
+    sensors = json.loads((folder / "sensor.json").read_text())
+    changed = [{**row, "channel": row["channel"].replace("LIDAR_TOP", "RADAR_FRONT")} for row in sensors]
+    (folder / "sensor.json").write_text(json.dumps(changed))
+    # another radar, a moment later and further on, comes first
+    (mount,) = (row for row in sensors if row["channel"] == "LIDAR_TOP")
+    calibrated = json.loads((folder / "calibrated_sensor.json").read_text())
+    of_radar = {row["token"] for row in calibrated if row["sensor_token"] == mount["token"]}
+    files = json.loads((folder / "sample_data.json").read_text())
+    poses = json.loads((folder / "ego_pose.json").read_text())
+    later: list[dict[str, Any]] = []
+    for row in files:
+        if row["calibrated_sensor_token"] in of_radar:
+            anew = {key: f"later{row[key]}" for key in ("token", "ego_pose_token")}
+            later.append({**row, **anew, "timestamp": 30_000 + row["timestamp"]})
+    wanted = {row["ego_pose_token"] for row in later}
+    moved = [{**row, "token": f"later{row['token']}"} for row in poses if f"later{row['token']}" in wanted]
+    moved = [{**row, "translation": [row["translation"][0] + 9.0, *row["translation"][1:]]} for row in moved]
+    extra = {"unknown": 1} if as_records else {}
+    (folder / "sample_data.json").write_text(json.dumps([{**row, **extra} for row in [*later, *files]]))
+    (folder / "ego_pose.json").write_text(json.dumps([*moved, *poses]))
+    summary = ingest(source, tmp_path / "after")
+    before, after = (list(open_dataset(tmp_path / name).labels()) for name in ("before", "after"))
+    assert before
+    assert [(each.timestamp_us, each.ego) for each in before] == [(each.timestamp_us, each.ego) for each in after]
+    assert [entry.name for entry in summary.left_out].count("ego pose") == 1
