@@ -22,7 +22,7 @@ from scenicq.match.problem.outcome import (
     Outcome,
     Refuted,
     Satisfied,
-    Steps,
+    SearchSteps,
     Undecided,
     finished,
     finished_together,
@@ -43,7 +43,7 @@ def decide_decomposed(items: list[Item], tolerance: Tolerance) -> Outcome:
     return finished(search_decomposed(items, tolerance))
 
 
-def search_decomposed(items: list[Item], tolerance: Tolerance, known: KnownCases | None = None) -> Steps:
+def search_decomposed(items: list[Item], tolerance: Tolerance, known: KnownCases | None = None) -> SearchSteps:
     """Decide a group without a solver, part by part where it has parts; `Undecided` where a solver is needed.
 
     Args:
@@ -91,7 +91,7 @@ def chooses_apart(items: Sequence[Item]) -> bool:
     return few and uses_far_field(left) and _shared(left, used) is not None
 
 
-def _all(parts: Sequence[list[Item]], items: list[Item], tolerance: Tolerance, known: KnownCases | None) -> Steps:
+def _all(parts: Sequence[list[Item]], items: list[Item], tolerance: Tolerance, known: KnownCases | None) -> SearchSteps:
     """Parts that have no random variable in common."""
     values: dict[Identity, Value] = {}
     doubt: Undecided | None = None

@@ -25,7 +25,7 @@ from scenicq.match.fields.heading_propagation import DirectedCases, KnownCases, 
 from scenicq.match.fields.shared_variable import find_shared_value, joined
 from scenicq.match.fields.witness_search import THOROUGH, find_witness
 from scenicq.match.problem.conditioned import Item, conditioned
-from scenicq.match.problem.outcome import Outcome, Patience, Refuted, Satisfied, Steps, Undecided, finished
+from scenicq.match.problem.outcome import Outcome, Patience, Refuted, Satisfied, SearchSteps, Undecided, finished
 from scenicq.match.tolerance import Tolerance
 
 __all__ = ["repaired", "search_directions"]
@@ -40,7 +40,7 @@ _CLOSE = 0.05
 
 def search_directions(
     parts: Sequence[list[Item]], shared: Identity | None, tolerance: Tolerance, known: KnownCases | None = None
-) -> Steps:
+) -> SearchSteps:
     """Decide a group with fields at hidden points, without a solver; `Undecided` where one is needed.
 
     Args:
@@ -109,7 +109,7 @@ def _one_by_one(found: Iterator[BoxSet]) -> Iterator[HeadingAssignment | None]:
         yield from (way for way in ways if way is not None)
 
 
-def _alone(start: BoxSet, first: Constraint, tolerance: Tolerance) -> Steps:
+def _alone(start: BoxSet, first: Constraint, tolerance: Tolerance) -> SearchSteps:
     """What comes of the ways of one part; those that are vague are divided until a solution holds or none is left."""
     todo: deque[HeadingAssignment] = deque()
     doubt, searched = Undecided(first, "nonlinear"), 0

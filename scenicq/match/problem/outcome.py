@@ -18,7 +18,7 @@ __all__ = [
     "Refuted",
     "Satisfied",
     "Search",
-    "Steps",
+    "SearchSteps",
     "Undecided",
     "finished",
     "finished_together",
@@ -87,14 +87,14 @@ class Undecided:
 Outcome = Satisfied | Refuted | Undecided
 """What is found of a question."""
 
-Steps: TypeAlias = Generator[Patience, None, Outcome]
+SearchSteps: TypeAlias = Generator[Patience, None, Outcome]
 """Decides a question step by step; before a step that takes long it says how much patience that takes."""
 
 
 class Search:
     """A question that is decided as far as patience goes, and from there on once there is more."""
 
-    def __init__(self, steps: Steps) -> None:
+    def __init__(self, steps: SearchSteps) -> None:
         """Take the steps, of which none was made."""
         self._steps = steps
         self._takes = Patience.LITTLE
@@ -125,7 +125,7 @@ class Search:
         return self._outcome
 
 
-def finished(steps: Steps) -> Outcome:
+def finished(steps: SearchSteps) -> Outcome:
     """The outcome, whatever it takes.
 
     Raises:
@@ -136,7 +136,7 @@ def finished(steps: Steps) -> Outcome:
     return outcome
 
 
-def finished_together(all_steps: Sequence[Steps]) -> Generator[Patience, None, list[Outcome]]:
+def finished_together(all_steps: Sequence[SearchSteps]) -> Generator[Patience, None, list[Outcome]]:
     """The outcomes of questions that all have to be satisfied; of the one that is refuted alone if one is."""
     searches = [Search(steps) for steps in all_steps]
     for patience in Patience:

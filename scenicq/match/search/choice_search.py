@@ -30,7 +30,7 @@ from scenicq.limits import LIMITS, exhausted
 from scenicq.match.problem.bipartite_matching import Slot
 from scenicq.match.problem.conditioned import Item, conditioned, fact, item_conjuncts, uses_far_field
 from scenicq.match.problem.evaluation import ground_cause, holds
-from scenicq.match.problem.outcome import Outcome, Patience, Refuted, Satisfied, Search, Steps, Undecided
+from scenicq.match.problem.outcome import Outcome, Patience, Refuted, Satisfied, Search, SearchSteps, Undecided
 from scenicq.match.search.backtracking import Consistency, find_assignments
 from scenicq.match.search.choice_problem import ChoiceProblem, ConstraintChoices
 from scenicq.match.search.outcome_bounds import possible_outcomes
@@ -42,11 +42,11 @@ __all__ = ["Ask", "AtLast", "search_choices"]
 _SEVERAL = 8
 """Combinations of outcomes from which on a witness is looked for over all of them, even if each may be cheap."""
 
-Decide = Callable[[list[Item]], Steps]
+Decide = Callable[[list[Item]], SearchSteps]
 """Decides constraints that hold no choices."""
 
 
-AtLast = Callable[[Sequence[Sequence[Item]]], Steps]
+AtLast = Callable[[Sequence[Sequence[Item]]], SearchSteps]
 """Decides them where nothing else does."""
 
 
@@ -117,7 +117,7 @@ class _ChoiceSearch:
         self.columns = problem.columns
         self.components = problem.components
 
-    def steps(self) -> Steps:
+    def steps(self) -> SearchSteps:
         """Decide the group."""
         excluded = self._narrow()
         if excluded is not None:
@@ -281,7 +281,7 @@ class _ChoiceSearch:
         one = self.components[number]
         return self._of(number, one.parts, one.lookups, one.slots, assignment, self._by_all_means)
 
-    def _by_all_means(self, items: list[Item]) -> Steps:
+    def _by_all_means(self, items: list[Item]) -> SearchSteps:
         outcome = yield from self.decide(items)
         if isinstance(outcome, Undecided) and self.at_last is not None:
             return (yield from self.at_last([items]))
@@ -294,7 +294,7 @@ class _ChoiceSearch:
         slots: frozenset[int],
         assignment: Mapping[int, int],
         decide: Decide,
-    ) -> Steps:
+    ) -> SearchSteps:
         given, taken = self._given(slots, assignment)
         asked = {id(lookup) for lookup in lookups}
         memo: dict[int, Node] = {id(node): Constant(float(pick), span=node.span) for node, pick in taken}

@@ -22,7 +22,16 @@ from scenicq.match.problem.candidates import LabelProblem
 from scenicq.match.problem.conditioned import Item, LabelNodes, uses_field
 from scenicq.match.problem.likely_values import likely_group
 from scenicq.match.problem.map_lookups import MapLookups
-from scenicq.match.problem.outcome import UNOBSERVED, Outcome, Patience, Refuted, Satisfied, Search, Steps, Undecided
+from scenicq.match.problem.outcome import (
+    UNOBSERVED,
+    Outcome,
+    Patience,
+    Refuted,
+    Satisfied,
+    Search,
+    SearchSteps,
+    Undecided,
+)
 from scenicq.match.problem.radius import within_radius
 from scenicq.match.search.choice_search import AtLast, search_choices
 from scenicq.match.search.group_plan import GroupPlan
@@ -88,7 +97,7 @@ class GroupCache:
             outcome = search.within(self.patience)
         return group, Undecided(group.constraints[0], "postponed") if outcome is None else outcome
 
-    def _steps(self, plan: GroupPlan, assignment: Mapping[int, int]) -> Steps:
+    def _steps(self, plan: GroupPlan, assignment: Mapping[int, int]) -> SearchSteps:
         outcome = self._in_closed_form(plan, assignment) or (yield from self._by_cascade(plan.group, assignment))
         if plan.group.doubtful and isinstance(outcome, Satisfied):
             return known_of(plan.group, (yield from self._by_cascade(surely(plan.group), assignment)))
@@ -101,7 +110,7 @@ class GroupCache:
         seen = self.problem.seen
         return plan.closed_form.decide(lambda index, name: seen[assignment[index]][name], self.options, self.lookups)
 
-    def _by_cascade(self, group: Group, assignment: Mapping[int, int]) -> Steps:
+    def _by_cascade(self, group: Group, assignment: Mapping[int, int]) -> SearchSteps:
         try:
             look()
             if self.options.method == "smt":
@@ -118,7 +127,7 @@ class GroupCache:
         except Exhausted as error:
             return Undecided.by(group.constraints[0], error)
 
-    def _decided(self, items: list[Item], at_last: AtLast) -> Steps:
+    def _decided(self, items: list[Item], at_last: AtLast) -> SearchSteps:
         """What the cascade says of constraints, and where it says nothing, what is asked at last."""
         tolerance = self.options.tolerance
         if chooses_apart(items):
@@ -131,7 +140,7 @@ class GroupCache:
         outcome = yield from search_decomposed(items, tolerance, self._cases)
         return (yield from at_last([items])) if isinstance(outcome, Undecided) else outcome
 
-    def _searched(self, items: Sequence[Sequence[Item]]) -> Steps:
+    def _searched(self, items: Sequence[Sequence[Item]]) -> SearchSteps:
         """What comes of boxes; where fields are, these were looked at already."""
         yield Patience.LIKELY
         flat = [item for group in items for item in group]
@@ -141,7 +150,7 @@ class GroupCache:
 
         return branch_and_prune(flat, self.options.tolerance)
 
-    def _at_last(self, items: Sequence[Sequence[Item]]) -> Steps:
+    def _at_last(self, items: Sequence[Sequence[Item]]) -> SearchSteps:
         """What nothing else decides: branch and prune, then the solver."""
         found = yield from self._searched(items)
         return self.ask(items, found) if isinstance(found, Undecided) else found
