@@ -42,11 +42,12 @@ def judge(run, parked):
 def test_table(judge, parked):
     done = judge("--simulated", parked[0] / "runs.csv")
     assert done.exit_code == 0, done.output
-    last = done.stdout.rstrip().splitlines()[-2:]
-    assert last[0].startswith("missed ")
-    assert " of role parkedCar against " in last[0]
-    assert last[0].endswith("over 16 recordings: worse than others that are alike")
-    assert last[1].endswith("the recordings speak for the failure")
+    verdict, beside, failures = done.stdout.rstrip().splitlines()[-3:]
+    assert verdict.startswith("missed ")
+    assert " of role parkedCar against " in verdict
+    assert verdict.endswith("over 16 recordings: worse than others that are alike")
+    assert beside.startswith("role parkedCar: 44 beside others of the same frame, ")
+    assert failures.endswith("the recordings speak for the failure")
 
 
 def test_formats(judge, tmp_path):
