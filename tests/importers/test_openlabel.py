@@ -155,7 +155,7 @@ def test_data_of_an_object_hold_in_all_its_frames(tmp_path: Path) -> None:
         [("0", 11, 0), ("1", 20, 5), ("2", 30, 0)],
         [("0", 12, 0), ("1", 20, 5)],
     ]
-    assert names(summary, "assumed") == {"steps of 0.1 s": 1, "an ego at rest": 1}
+    assert names(summary, "assumed") == {"steps of 0.1 s": 1, "an ego at rest": 1, "no map": 1}
 
 
 def test_a_file_without_frames_is_one(tmp_path: Path) -> None:
