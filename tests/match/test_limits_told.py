@@ -36,6 +36,6 @@ def test_a_frame_that_a_limit_leaves_unknown_says_which(limit: str, monkeypatch:
     monkeypatch.setattr(LIMITS, "witness_trials", 0)
     verdict = Matcher(scenario, MatchOptions(tolerance=EXACT)).match(label)
     assert isinstance(verdict, Unknown)
-    # where boxes are what decides then, these get too small
-    told = [(error.reason, error.detail) for error in map(exhausted, (limit, "heading_width"))]
+    # where boxes are what decides then, these get too small or too many
+    told = [(error.reason, error.detail) for error in map(exhausted, (limit, "heading_width", "pruned_boxes"))]
     assert (verdict.reason, verdict.cause.detail) in told
