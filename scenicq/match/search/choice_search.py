@@ -36,7 +36,7 @@ from scenicq.match.search.choice_problem import ChoiceProblem, ConstraintChoices
 from scenicq.match.search.outcome_bounds import possible_outcomes
 from scenicq.match.tolerance import Tolerance
 
-__all__ = ["Ask", "AtLast", "search_choices"]
+__all__ = ["AtLast", "search_choices"]
 
 
 _SEVERAL = 8
@@ -48,10 +48,6 @@ Decide = Callable[[list[Item]], SearchSteps]
 
 AtLast = Callable[[Sequence[Sequence[Item]]], SearchSteps]
 """Decides them where nothing else does."""
-
-
-Ask = Callable[[Sequence[Sequence[Item]]], Outcome]
-"""Asks a solver about constraints that hold no choices."""
 
 
 def search_choices(
