@@ -133,6 +133,7 @@ class HiddenRuns:
     ) -> Runs:  # fmt: skip
         """The runs by those values of hidden numbers with which they may match, or by all."""
         pieces = follow_runs(self.machine, stretches, columns.reader(expanded), hidden, possible)
+        look()
         shared = {leaf.identity for leaf in leaves(*roots_of(replace(self.scenario, dynamics=None)))}
         joint = [place for place, leaf in enumerate(hidden.variables) if leaf.identity in shared]
         thin = _thin(pieces)
@@ -143,6 +144,7 @@ class HiddenRuns:
             proved = np.unique((pieces.of * width + pieces.ends)[~thin & (pieces.truth == TRUE)])
             doubted &= ~np.isin(pieces.of * width + pieces.ends, proved)
         self._confirm(pieces, np.flatnonzero(doubted), stretches, expanded, hidden)
+        look()
         order = np.lexsort((*pieces.low.T[::-1], thin, -pieces.ends, -pieces.truth.astype(np.int64), pieces.of))
         firsts = np.flatnonzero(np.diff(pieces.of[order], prepend=-1))
         every = np.arange(len(stretches.starts))
@@ -154,6 +156,7 @@ class HiddenRuns:
         new = (np.diff(pieces.of[matches], prepend=-1) != 0) | (np.diff(pieces.ends[matches], prepend=-1) != 0)
         kept = np.zeros(len(pieces), np.bool_)
         kept[order[firsts]] = kept[matches[new]] = True
+        look()
         for each in cast("list[int]", matches[new].tolist()):
             pieces.details[each] = "", _Witness(hidden, pieces, each)
         return pieces.some(order[kept[order]]).at(every, np.arange(len(stretches)))

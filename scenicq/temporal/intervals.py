@@ -171,6 +171,7 @@ class IntervalMatcher:
                     parts.append(runs.at(which[some.numbers], some.labels))
         if not parts:
             return Reported([])
+        look()
         found = Runs.joined(parts)
         found = replace(found, truth=np.minimum(found.truth, np.where(table.sure[found.of], TRUE, UNKNOWN)))
         return self._reported(found, table, order, bindings, every=every)
@@ -231,6 +232,7 @@ class IntervalMatcher:
         if len(self.outcomes) > 1:
             surest = _surest(first, last, truth[several])
             several, first, last = several[surest], first[surest], last[surest]
+        look()
         kept = several[chosen(first, last, truth[several], lasting[several], self.options.intervals, least)]
         told = self._verdicts(found.some(np.concatenate((alone, kept))), table, order)
         # what was cut off might have matched; else what was matched but is too short, else what came furthest

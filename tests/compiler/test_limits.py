@@ -72,7 +72,7 @@ def test_a_program_ends_where_its_steps_take_too_long(monkeypatch):
         "x = Uniform(*network.lanes)\nnew Car on x, with lane x",
     ],
 )
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(12)
 def test_numbers_near_the_end_of_all_numbers_break_nothing(text, run, tmp_path, crossroads):
     file = tmp_path / "p.scenic"
     file.write_text(HEAD + text)

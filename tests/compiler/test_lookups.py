@@ -158,7 +158,7 @@ def pushed(name: str, rng: random.Random) -> Label:
 
 
 @pytest.mark.parametrize("name", PROGRAMS)
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(10)
 def test_labels_side_by_side_are_decided_as_each_by_itself(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     rng = random.Random(name)
     labels = [pushed(name, rng) for _ in range(24)]

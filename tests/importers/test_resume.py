@@ -282,6 +282,7 @@ def test_an_update_reads_recordings_of_a_segment_that_are_new_or_have_changed(
 
 
 @pytest.mark.parametrize("largest", [15, 60, 10_000])
+@pytest.mark.one_in(3)
 def test_any_row_of_updates_gives_what_a_fresh_ingest_gives(
     largest: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rounds: Callable[[int], int]
 ) -> None:

@@ -147,6 +147,7 @@ class _Hanging:
 
 
 @pytest.mark.parametrize("until_s", [None, 0.5])
+@pytest.mark.one_in(2)
 def test_what_takes_all_time_has_no_more_than_the_budget(until_s, dataset, monkeypatch):
     """A label may take a minute, the advice not: neither in one label nor in all of them."""
     text = (
