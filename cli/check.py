@@ -31,7 +31,7 @@ from .cache import user_cache
 from .datasets import open_checked
 from .main import ERROR
 from .manual import Manual
-from .programs import PROGRAM_TEXT, SCENARIO, given_program
+from .programs import MAP_DEFAULTS, PROGRAM_TEXT, SCENARIO, given_program
 from .report import as_json, count, show
 from .streams import say
 
@@ -190,9 +190,7 @@ def _found(
 @PROGRAM_TEXT
 @click.option("--map", "map_file", metavar="FILE", type=click.Path(path_type=Path), help="A GeoJSON or OpenDRIVE map.")
 @click.option("--scenic", type=click.Choice(["1", "2", "3"]), help="Version of Scenic.  [default: inferred]")
-@click.option("--map-defaults/--no-map-defaults", default=True,
-              help="Whether the world model places and turns what the program does not: a car on the road, along it. "
-              "Without a map it never does.")  # fmt: skip
+@MAP_DEFAULTS
 @click.option("--initial", is_flag=True, help="Ignore behaviors and other dynamic parts.")
 @click.option("--forest", is_flag=True, help="Print the expression forest.")
 @click.option("--groups", is_flag=True, help="Print the groups of jointly dependent constraints, in order.")

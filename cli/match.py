@@ -39,7 +39,7 @@ from .options import DEFAULTS, TOPICS, option_type, query_options
 from .output import ProgressBar, choose_format
 from .pieces import LateShardError, Shard, parse_shard, run_shard
 from .plan import show_plan
-from .programs import PROGRAM_TEXT, SCENARIO, given_program
+from .programs import MAP_DEFAULTS, PROGRAM_TEXT, SCENARIO, given_program
 from .remarks import remarks, show_remarks
 from .report import show
 from .sources import SENSORS
@@ -141,9 +141,7 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
               help="Write a page with pictures of the matches, too: DIR/index.html.")
 @SENSORS
 @click.option("--scenic", type=option_type("scenic"), help="Version of Scenic.  [default: inferred]")
-@click.option("--map-defaults/--no-map-defaults", default=True,
-              help="Whether the world model places and turns what the program does not: a car on the road, along it. "
-              "Without a map it never does.")  # fmt: skip
+@MAP_DEFAULTS
 @click.option("--initial", is_flag=True, help="Ignore behaviors and other dynamic parts: match the initial scene.")
 @click.option("--behaviors", type=click.Choice(["ignore"]), help="ignore leaves behaviors out and matches the rest of "
               "a dynamic program over time.")

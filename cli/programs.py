@@ -12,7 +12,7 @@ from scenicq.errors import DataError, Diagnostic, Source
 from scenicq.query.execution.option_texts import DRIVING
 from scenicq.query.execution.program_files import read_program
 
-__all__ = ["PROGRAM_TEXT", "SCENARIO", "given_program", "read_scenario"]
+__all__ = ["MAP_DEFAULTS", "PROGRAM_TEXT", "SCENARIO", "given_program", "read_scenario"]
 
 SCENARIO = "A Scenic program, as a file; `-` is standard input. Not with -e."
 """What the help says of the argument."""
@@ -25,6 +25,13 @@ PROGRAM_TEXT = click.option(
     "unless it imports another.",
 )
 """The option for a program in place of the argument; see `given_program`."""
+MAP_DEFAULTS = click.option(
+    "--map-defaults/--no-map-defaults",
+    default=True,
+    help="Whether the world model places and turns what the program does not: a car on the road, along it. Without a "
+    "map it never does.",
+)
+"""The option for what plain words ask of a map; see `compile_scenario`."""
 
 
 def read_scenario(path: Path) -> Source:

@@ -17,7 +17,7 @@ from .check import networks_of, read_version
 from .manual import Manual
 from .option_type import OptionType
 from .options import option_type
-from .programs import PROGRAM_TEXT, SCENARIO, given_program
+from .programs import MAP_DEFAULTS, PROGRAM_TEXT, SCENARIO, given_program
 from .streams import say
 
 __all__ = ["sample"]
@@ -53,9 +53,7 @@ __all__ = ["sample"]
     help="Seconds of the processor for one scene.",
 )
 @click.option("--scenic", type=option_type("scenic"), help="Version of Scenic.  [default: inferred]")
-@click.option("--map-defaults/--no-map-defaults", default=True,
-              help="Whether the world model places and turns what the program does not: a car on the road, along it. "
-              "Without a map it never does.")  # fmt: skip
+@MAP_DEFAULTS
 @click.option("--initial", is_flag=True, help="Ignore behaviors and other dynamic parts.")
 @click.option("-o", "--output", metavar="DIR", type=click.Path(path_type=Path),
               help="Write an interchange folder with labels and map, to be ingested.")  # fmt: skip

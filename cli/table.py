@@ -207,10 +207,12 @@ def _cells(record: Record) -> Row:
     cause = record.cause or CauseRecord()
     near = cause.what in ("tolerance", "program", "--min-duration")
     density = None if record.log_density is UNSET else record.log_density
-    if density is None and record.log_density is not UNSET and record.verdict == "match":
+    if density is not None:
+        why = f"{density:.2f}"
+    elif record.log_density is not UNSET and record.verdict == "match":
         why = f"no density ({record.no_density})"
     else:
-        why = f"{density:.2f}" if density is not None else cause.reason or (cause.detail if near else cause.what)
+        why = cause.reason or (cause.detail if near else cause.what)
     objects = [f"{role}={label}" for role, label in record.correspondence.items() if (role, label) != ("ego", "ego")]
     verdict = f"{record.verdict}: {why}" if why else record.verdict
     if isinstance(record, IntervalRecord):

@@ -85,7 +85,6 @@ _ROAD_TYPES: dict[str, ModelValue] = {"ManeuverType": MANEUVER_TYPES, **{cls.__n
 
 _ANYWHERE = {"position": "new Point in everywhere", "heading": "Range(0, 360) deg", "regionContainedIn": "everywhere"}
 """The defaults of places and directions where no map has any."""
-_MAP_NAMES = frozenset({"network", "road", "roadDirection", "roadOrShoulder", "curb", "sidewalk", "walkway"})
 
 
 @cache
@@ -119,10 +118,10 @@ def _without_map(statement: ast.Statement) -> ast.Statement:
     """A statement of a library in which no class asks anything of the map."""
     if not isinstance(statement, ast.ClassDef):
         return statement
-    anywhere = _anywhere()
+    anywhere, of_map = _anywhere(), network_names(Network("none", ()), "webots_road").keys()
     body = (
         replace(each, value=anywhere[each.name])
-        if isinstance(each, ast.PropertyDefault) and each.name in anywhere and _names_of(each.value) & _MAP_NAMES
+        if isinstance(each, ast.PropertyDefault) and each.name in anywhere and _names_of(each.value) & of_map
         else each
         for each in statement.body
     )

@@ -149,12 +149,9 @@ def _anywhere(objects: list[Instance]) -> tuple[Diagnostic, ...]:
 
 def _is_anywhere(instance: Instance) -> bool:
     """Whether an object's place or direction is a default that stands for what the map lacks."""
-    for name in ("position", "heading"):
-        chain = (each.definitions.get(name) for each in instance.cls.ancestry())
-        definition = next((each for each in chain if each is not None), None)
-        if definition is not None and name not in instance.explicit and is_anywhere(definition.default):
-            return True
-    return False
+    left = {"position", "heading"} - instance.explicit
+    used = (definition for name in left if (definition := instance.cls.definition(name)) is not None)
+    return any(is_anywhere(each.default) for each in used)
 
 
 def _on_map(error: ScenarioError, network: Network) -> ScenarioError:

@@ -103,6 +103,10 @@ class ScenicClass:
             current = current.base
         return chain
 
+    def definition(self, name: str) -> PropertyDefinition | None:
+        """The property line that counts for a property, the most derived one."""
+        return next((each.definitions[name] for each in self.ancestry() if name in each.definitions), None)
+
     def derives_from(self, name: str) -> bool:
         """Whether the class or a superclass has a name."""
         return any(ancestor.name == name for ancestor in self.ancestry())

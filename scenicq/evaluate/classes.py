@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from scenicq.evaluate.detection import ERRORS_AT_M, Detection
 from scenicq.evaluate.precision import ERRORS, average_precision, mean_errors, resampled_errors
-from scenicq.evaluate.resampling import Interval, effective_number, interval_of, ratio_interval
+from scenicq.evaluate.resampling import Interval, effective_number, interval_of, ratio_interval, sums_by
 
 __all__ = ["ClassFigures", "class_figures"]
 
@@ -90,12 +90,12 @@ class _OneClass:
         self._clipped = detection.predictions.protocol.clipped
         self._least = least
         self._high = detection.predictions.score[mine] >= least
-        self._per = np.bincount(self._of_objects, minlength=self._clusters).astype(np.float64)
+        self._per = sums_by(self._of_objects, np.ones(len(objects)), self._clusters)
         self._number = effective_number(self._per)
         self._bin = np.arange(len(mine)) * _BINS // max(len(mine), 1)
 
     def _by_cluster(self, which: Bools) -> Reals:
-        return np.bincount(self._of_mine[which], minlength=self._clusters).astype(np.float64)
+        return sums_by(self._of_mine, which, self._clusters)
 
     def _binned(self, values: Reals) -> Reals:
         """Sums up to each class of scores in each resample, shape (resamples, bins)."""
@@ -108,7 +108,7 @@ class _OneClass:
         detection = self._detection
         found = detection.owner[distance][self._mine] >= 0
         hit = detection.score[distance][self._objects] >= self._least
-        hits = np.bincount(self._of_objects[hit], minlength=self._clusters).astype(np.float64)
+        hits = sums_by(self._of_objects, hit, self._clusters)
         right, all_high = self._by_cluster(found & self._high), self._by_cluster(self._high)
         objects = np.array([float(len(self._objects))])
         exact = average_precision(

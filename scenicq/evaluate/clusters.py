@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.evaluate.annotations import Frames
+from scenicq.forest.components import connected_components
 
 __all__ = ["CLUSTER_KEYS", "RECORDING", "Clusters", "find_clusters", "parameters_of"]
 
@@ -28,7 +29,7 @@ class Clusters:
 
     Attributes:
         unit: What they share, such as "drive"; "recording" where each stands alone.
-        number: Of each frame's cluster, shape (frames,).
+        number: The cluster of each frame, shape (frames,).
         count: How many there are.
     """
 
@@ -67,18 +68,13 @@ def find_clusters(frames: Frames, key: str | None = None) -> Clusters:
 
 def _joined(value: Numbers, recording: NDArray[np.int32]) -> tuple[Numbers, int]:
     """The cluster of each frame: a recording in which the value changes joins those of all its values."""
-    root = list(range(int(value.max(initial=-1)) + 1))
-
-    def top(number: int) -> int:
-        while root[number] != number:
-            number = root[number]
-        return number
-
-    first: dict[int, int] = {}
-    for each, its in zip(recording.tolist(), value.tolist(), strict=True):
-        root[top(its)] = top(first.setdefault(each, its))
-    _, found = np.unique([top(each) for each in value.tolist()], return_inverse=True)
-    return found.astype(np.int64), int(found.max(initial=-1)) + 1
+    pairs = np.unique(np.column_stack((value, recording)), axis=0)
+    recordings = np.split(pairs[:, 1], np.flatnonzero(np.diff(pairs[:, 0])) + 1)
+    parts = connected_components([each.tolist() for each in recordings])
+    cluster = np.empty(int(value.max(initial=-1)) + 1, dtype=np.int64)
+    for number, part in enumerate(parts):
+        cluster[part] = number
+    return cluster[value], len(parts)
 
 
 def parameters_of(frames: Frames, clusters: Clusters) -> Mapping[str, tuple[list[str], Numbers]]:

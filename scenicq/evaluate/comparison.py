@@ -20,6 +20,7 @@ from scenicq.evaluate.resampling import (
     count_test,
     difference_interval,
     effective_number,
+    means_by,
     ratio_interval,
     sign_flip_test,
     student,
@@ -70,7 +71,7 @@ class Share:
     Attributes:
         missed, of: How many; weighted, where the others are spread as the group is.
         rate: The share; nan without objects.
-        interval: Of 95 %; nan where there are too few recordings for one.
+        interval: 95 % of such intervals hold the truth; nan where there are too few recordings for one.
         recordings: How many equally large clusters would tell as much.
     """
 
@@ -87,11 +88,12 @@ class ObjectComparison:
 
     Attributes:
         about: What is compared, such as "role parkedCar".
-        share: Of the objects in question to which others are alike; of all of them where none is.
-        other: Of those others, spread as the objects in question are, and corrected for what distances still differ.
-        difference: Of the two rates.
-        interval: Of the difference.
-        p_value: Of the test that objects of both groups are missed alike; nan where there is no verdict.
+        share: What is missed of the objects in question to which others are alike; of all of them where none is.
+        other: What is missed of those others, spread as the objects in question are, and corrected for what distances
+            still differ.
+        difference: The first rate less the second.
+        interval: That of the difference.
+        p_value: How probable as much is by chance, were both groups missed alike; nan where there is no verdict.
         recordings: Clusters with an object in question that is compared.
         effective: Number of equally large clusters that would tell as much, of the group that has fewer.
         asked: How many objects are in question.
@@ -276,7 +278,7 @@ def _compared(
     p_value = math.nan
     if not missing:
         # where others are of the same cluster, what is expected of both cancels
-        expected = _mean_of(lost, np.abs(found.difference), _alike(found, like)) if found.elsewhere.any() else 0.0
+        expected = means_by(_alike(found, like), lost, np.abs(found.difference)) if found.elsewhere.any() else 0.0
         scores = by_cluster(found.difference * (lost - expected))
         counted = count_test(first, second, (first_number, second_number))
         p_value = max(counted, sign_flip_test(scores, rng))
@@ -332,12 +334,6 @@ def _alike(found: Controls, like: Likeness) -> Numbers:
     return number_of((like.kind, like.params, np.searchsorted(ends, like.distance).astype(np.int64)))
 
 
-def _mean_of(lost: Reals, weight: Reals, group: Numbers) -> Reals:
-    """The weighted mean of each object's group, shape (n,)."""
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return np.nan_to_num(sums_by(group, weight * lost) / sums_by(group, weight))[group]
-
-
 def _spread_within(lost: Reals, found: Controls, like: Likeness) -> float:
     """The variance of the difference if each object were missed by itself, at the rate of those that are alike.
 
@@ -345,7 +341,7 @@ def _spread_within(lost: Reals, found: Controls, like: Likeness) -> float:
     """
     group = number_of((_alike(found, like), found.compared.astype(np.int64)))
     weight = np.square(found.difference)
-    rate = _mean_of(lost, weight, group)
+    rate = means_by(group, lost, weight)
     used = (weight > 0).astype(np.float64)
     count = sums_by(group, used)[group]
     return float(weight @ (rate * (1 - rate) * count / np.maximum(count - 1, 1)))

@@ -18,6 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from scenicq.evaluate.resampling import means_by
+
 __all__ = ["CALIPER", "PLACES", "Controls", "Likeness", "find_controls", "number_of"]
 
 Reals = NDArray[np.float64]
@@ -186,7 +188,7 @@ def _at_one_distance(difference: Reals, compared: Bools, like: Likeness) -> Real
         columns = np.column_stack((curve, compared[rows].astype(np.float64)))
         gap = curve.T @ difference[rows]
         group = number_of((like.recording[rows], like.kind[rows]))
-        inside = columns - _means(columns, weight, group)
+        inside = columns - np.column_stack([means_by(group, each, weight) for each in columns.T])
         square = inside.T @ (weight[:, None] * inside)
         scale = np.sqrt(np.maximum(np.diag(square), 1e-12))
         square = square / scale[:, None] / scale + _RIDGE * np.eye(len(scale))
@@ -200,9 +202,3 @@ def _curve(distance: Reals, asked: Reals) -> Reals:
     bends = np.unique(np.quantile(asked, _BENDS)) if len(asked) else np.zeros(0)
     bends = bends[(bends > distance.min(initial=0.0)) & (bends < distance.max(initial=0.0))]
     return np.column_stack((distance, *(np.maximum(distance - bend, 0.0) for bend in bends.tolist())))
-
-
-def _means(columns: Reals, weight: Reals, group: Numbers) -> Reals:
-    """Weighted means by group, at each row."""
-    total = np.bincount(group, weights=weight)
-    return np.column_stack([(np.bincount(group, weights=weight * each) / total)[group] for each in columns.T])

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple, cast
 
@@ -28,12 +28,12 @@ from scenicq.evaluate.observed_columns import ANGLES, Observed, ObservedColumns
 from scenicq.evaluate.variables import Draws, density_of, point_density
 from scenicq.forest.columns import Array, Data, Vectors, constant_column
 from scenicq.forest.condition import condition
+from scenicq.forest.degree import NOT_AFFINE, degree
 from scenicq.forest.groups import Comparison, Condition, Group
 from scenicq.forest.nodes import (
     Arithmetic,
     ArithmeticOp,
     Constant,
-    Coordinate,
     DiscAt,
     Identity,
     Index,
@@ -44,15 +44,12 @@ from scenicq.forest.nodes import (
     Range,
     RectangleAt,
     Rotate,
-    Scale,
     SectorAt,
     Select,
     TruncatedNormal,
     Value,
-    VectorOf,
-    VectorSum,
 )
-from scenicq.forest.walk import children, is_leaf, leaves, postorder, rebuild
+from scenicq.forest.walk import children, leaves, postorder, rebuild
 
 __all__ = ["GroupDensity", "GroupValues"]
 
@@ -343,7 +340,7 @@ class GroupDensity:
 
     def _is_affine(self, columns: ObservedColumns, chosen: Sequence[Leaf], wanted: int) -> bool:
         """Whether the features are affine in some variables, of which they tell the values."""
-        if _degree(self._roots_of_continuous(), {leaf.identity for leaf in chosen}) > 1:
+        if degree(self._roots_of_continuous(), {leaf.identity for leaf in chosen}, _of_draw) > 1:
             return False
         base = self._at(columns, [np.zeros((1, 1))] * wanted, chosen)
         columns_: list[list[Array]] = []
@@ -354,40 +351,17 @@ class GroupDensity:
         return bool(np.any(size > _TINY))
 
 
-_NEVER = 2
-"""The degree of what is not affine."""
-
-
-def _degree(roots: Sequence[Node], chosen: Collection[Identity]) -> int:
-    """0 for expressions that do not hang on some variables, 1 for affine ones, whatever the others come out as."""
-    degrees: dict[int, int] = {}
-    for node in postorder(roots):
-        own = [degrees[id(child)] for child in children(node)]
-        degrees[id(node)] = 1 if is_leaf(node) and cast(Leaf, node).identity in chosen else _degree_of(node, own)
-    return max(degrees[id(root)] for root in roots)
-
-
-def _degree_of(node: Node, own: Sequence[int]) -> int:
-    """The degree of an expression, from those of its children."""
-    most = max(own, default=0)
-    if not most:
-        return 0
+def _of_draw(node: Node, own: Sequence[int]) -> int:
+    """The degree of a draw, which for other parameters is moved and stretched, and of regions that it is of."""
     match node:
-        case Arithmetic(op=ArithmeticOp.ADD | ArithmeticOp.SUB | ArithmeticOp.NEG):
-            return most
-        case Arithmetic(op=ArithmeticOp.MUL) | Scale():
-            return min(sum(own), _NEVER)
-        # a draw is what it is for other parameters, moved and stretched
-        case VectorOf() | VectorSum() | Coordinate() | Range() | Normal():
-            return most
-        case PointIn():
-            return most if isinstance(node.region, DiscAt | SectorAt | RectangleAt) else _NEVER
-        case Arithmetic(op=ArithmeticOp.DIV) | Rotate() | DiscAt() | SectorAt() | RectangleAt():
-            return own[0] if not any(own[1:]) else _NEVER
-        case Select():
-            return most if not own[0] else _NEVER
+        case Range() | Normal():
+            return max(own)
+        case PointIn() if isinstance(node.region, DiscAt | SectorAt | RectangleAt):
+            return max(own)
+        case Rotate() | DiscAt() | SectorAt() | RectangleAt():
+            return own[0] if not any(own[1:]) else NOT_AFFINE
         case _:
-            return _NEVER
+            return NOT_AFFINE
 
 
 def _row_means(values: Array, rows: int) -> Reals:

@@ -25,7 +25,7 @@ from scenicq.evaluate.matched import Matched, read_matched
 from scenicq.evaluate.resampling import holm, resamples
 from scenicq.evaluate.simulation import Simulated, read_simulated, verdict
 from scenicq.evaluate.slices import Slice, slices
-from scenicq.evaluate.weighting import Weighted, weighted
+from scenicq.evaluate.weighting import Weighted, weigh
 from scenicq.importers.prediction_files import read_predictions
 from scenicq.importers.predictions import THRESHOLDS_M, Predictions
 from scenicq.option_values import MARGIN_OPTION, SCORE, SEED, OneOf, read_option
@@ -330,7 +330,7 @@ class _Judge:
     def _combined(self, names: Iterable[str]) -> NDArray[np.int64]:
         """The number of each frame's combination of parameters."""
         whole = np.zeros(len(self._detection.frames.names), dtype=np.int64)
-        return number_of((whole, *(self._parameters[name][1] for name in names))) if len(whole) else whole
+        return number_of((whole, *(self._parameters[name][1] for name in names)))
 
     def scenario(self, matched: Matched) -> ScenarioEvaluation:
         """The figures of one scenario."""
@@ -405,7 +405,7 @@ class _Judge:
             for about, mine in asked:
                 numbers = np.flatnonzero(mine)
                 of_frame = log_weight[self._detection.objects.frame[numbers]]
-                yield weighted(about, self._missed[numbers], of_frame, self._like.cluster[numbers])
+                yield weigh(about, self._missed[numbers], of_frame, self._like.cluster[numbers])
 
     def _of_classes(self, mine: Bools) -> Bools:
         return np.isin(self._like.category, np.unique(self._like.category[mine]))

@@ -29,6 +29,7 @@ __all__ = [
     "effective_number",
     "holm",
     "interval_of",
+    "means_by",
     "ratio_interval",
     "resamples",
     "sign_flip_test",
@@ -56,11 +57,23 @@ def sums_by(number: NDArray[np.int64], values: Reals | NDArray[np.bool_], count:
     """The sum of the values of each cluster, shape (clusters,).
 
     Args:
-        number: Of each value's cluster, shape (n,).
+        number: The cluster of each value, shape (n,).
         values: Shape (n,).
         count: How many clusters there are at least.
     """
     return np.bincount(number, weights=values, minlength=count).astype(np.float64)
+
+
+def means_by(number: NDArray[np.int64], values: Reals, weights: Reals) -> Reals:
+    """The weighted mean of each value's group, 0 where it has no weight, shape (n,).
+
+    Args:
+        number: The group of each value, shape (n,).
+        values: Shape (n,).
+        weights: How much each counts, shape (n,).
+    """
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.nan_to_num(sums_by(number, weights * values) / sums_by(number, weights))[number]
 
 
 def resamples(clusters: int, rng: np.random.Generator, count: int = RESAMPLES) -> Reals:
@@ -111,7 +124,7 @@ def wilson(rate: float, number: float, reach: float) -> Interval:
 
     Args:
         rate: The share.
-        number: Of how many independent objects.
+        number: How many independent objects it is of.
         reach: Standard errors either way.
     """
     square = reach * reach / number
@@ -145,7 +158,7 @@ def difference_interval(first: float, second: float, numbers: tuple[float, float
     Args:
         first: The first share.
         second: The other.
-        numbers: Of how many independent objects each is.
+        numbers: How many independent objects each is of.
         reach: Standard errors either way.
     """
     low, high = wilson(first, numbers[0], reach)
@@ -198,7 +211,7 @@ def count_test(first: float, second: float, numbers: tuple[float, float]) -> flo
     Args:
         first: The share missed of one group.
         second: That of the other.
-        numbers: Of how many independent objects each is.
+        numbers: How many independent objects each is of.
 
     Returns:
         A p-value of two sides.

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scenicq.evaluate.comparison import Share, percent
 from scenicq.evaluate.resampling import CLUSTERS, effective_number, ratio_interval, sums_by
 
-__all__ = ["Weighted", "log_weights", "weighted"]
+__all__ = ["Weighted", "log_weights", "weigh"]
 
 Reals = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -105,7 +105,7 @@ class Weighted:
         return text + (": too few recordings for a verdict" if self.recordings < CLUSTERS else "")
 
 
-def weighted(about: str, missed: Bools, log_weight: Reals, cluster: NDArray[np.int64]) -> Weighted:
+def weigh(about: str, missed: Bools, log_weight: Reals, cluster: NDArray[np.int64]) -> Weighted:
     """The share of some objects that was missed, each counting by its weight.
 
     Args:

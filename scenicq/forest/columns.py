@@ -29,6 +29,7 @@ __all__ = [
     "Data",
     "Placed",
     "Vectors",
+    "arrays_of",
     "column_of",
     "common_status",
     "constant_column",
@@ -154,10 +155,11 @@ def common_status(columns: Sequence[Column]) -> NDArray[np.int8]:
 
 def _parts(column: Column) -> tuple[Array, ...]:
     """The arrays of a column, the status last."""
-    return *_arrays(column.data), column.status
+    return *arrays_of(column.data), column.status
 
 
-def _arrays(data: Data) -> tuple[Array, ...]:
+def arrays_of(data: Data) -> tuple[Array, ...]:
+    """The arrays that values are made of."""
     if isinstance(data, Placed):
         return *data.center, *data.numbers
     return data if isinstance(data, tuple) else (data.which if isinstance(data, Coded) else data,)
@@ -177,7 +179,7 @@ def distances(shape: Placed, x: Array, y: Array) -> Array:
 
 def value_reader(data: Data, shape: tuple[int, ...]) -> Callable[[int], Value]:
     """The value at a place of a row of all."""
-    arrays = [np.broadcast_to(each, shape).ravel() for each in _arrays(data)]
+    arrays = [np.broadcast_to(each, shape).ravel() for each in arrays_of(data)]
     if isinstance(data, Placed):
         node: Node = data.node
 

@@ -21,6 +21,7 @@ from scenicq.geometry.fields import VectorField
 from scenicq.geometry.regions import Region
 
 __all__ = [
+    "MIRRORED",
     "Arithmetic", "ArithmeticOp", "Bearing", "Compare", "CompareOp", "Constant", "Contains", "Coordinate",
     "DirectionAt", "DiscAt", "DiscreteRange", "Distance", "Encloses", "Feature", "Identity", "Index", "Intersects",
     "Kind", "Leaf", "Logic", "LogicOp", "Node", "Norm", "Normal", "PointIn", "Range", "RectangleAt",
@@ -84,6 +85,12 @@ class CompareOp(StrEnum):
     GE = ">="
     EQ = "=="
     NE = "!="
+
+
+MIRRORED = {
+    CompareOp.LT: CompareOp.GT, CompareOp.LE: CompareOp.GE, CompareOp.GT: CompareOp.LT, CompareOp.GE: CompareOp.LE,
+}  # fmt: skip
+"""Orders as they are with the sides exchanged."""
 
 
 class LogicOp(StrEnum):

@@ -13,6 +13,7 @@ from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.forest.kinds import kind_of
 from scenicq.forest.nodes import (
+    MIRRORED,
     Arithmetic,
     ArithmeticOp,
     Compare,
@@ -71,11 +72,6 @@ def with_any_value(root: Node, unobserved: Callable[[Feature], bool]) -> Node:
 
 
 _FALSE, _TRUE = build.constant(False), build.constant(True)
-
-
-_MIRRORED = {
-    CompareOp.LT: CompareOp.GT, CompareOp.LE: CompareOp.GE, CompareOp.GT: CompareOp.LT, CompareOp.GE: CompareOp.LE,
-}  # fmt: skip
 
 
 class _Reader:
@@ -189,7 +185,7 @@ class _Reader:
             case Compare(left=Arithmetic(op=ArithmeticOp.MIN | ArithmeticOp.MAX) as extreme):
                 return self._of_extreme(node.op, extreme, node.right, node.span, selects)
             case Compare(right=Arithmetic(op=ArithmeticOp.MIN | ArithmeticOp.MAX) as extreme):
-                return self._of_extreme(_MIRRORED.get(node.op, node.op), extreme, node.left, node.span, selects)
+                return self._of_extreme(MIRRORED.get(node.op, node.op), extreme, node.left, node.span, selects)
             case _:
                 return self._atom(node, reading, selects)
 
@@ -197,7 +193,7 @@ class _Reader:
         self, op: CompareOp, extreme: Arithmetic, bound: Node, span: Span | None, selects: int
     ) -> Truths:  # fmt: skip
         """The same of `min(a, b) < c` and its like: one operand, or each, is beyond; `==` is both ways."""
-        if op not in _MIRRORED:
+        if op not in MIRRORED:
             sides = (self._of_extreme(each, extreme, bound, span, selects) for each in (CompareOp.LE, CompareOp.GE))
             same = _joined(LogicOp.AND, *sides)
             return same if op is CompareOp.EQ else _opposite(same)
@@ -263,7 +259,7 @@ def _of_speed(node: Node, reading: set[int]) -> Truths:
         case Compare(left=Feature(property="speed") as speed, right=bound) if id(bound) not in reading:
             op = node.op
         case Compare(left=bound, right=Feature(property="speed") as speed) if id(bound) not in reading:
-            op = _MIRRORED.get(node.op, node.op)
+            op = MIRRORED.get(node.op, node.op)
         case _:
             return _FALSE, _TRUE
     if id(speed) not in reading or kind_of(bound) != "scalar":

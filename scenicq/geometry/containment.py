@@ -29,12 +29,12 @@ from scenicq.geometry.regions import (
 )
 from scenicq.geometry.terms import overlap, rectangle_shape
 
-__all__ = ["covers", "covers_many", "missed_areas", "overlaps", "surely_covers_many"]
+__all__ = ["SLIVER", "covers", "covers_many", "missed_areas", "overlaps", "surely_covers_many"]
 
 Answer: TypeAlias = bool | None
 """None where it cannot be told: a region removes too many separate discs, or has no end."""
 
-_SLIVER = 1e-9
+SLIVER = 1e-9
 """Share of a box's area that polygons side by side may leave open between them."""
 _EDGE_M = 1e-6
 """How far the edge of a box may stick out of other regions."""
@@ -72,7 +72,7 @@ def covers(outer: Region, box: Polygon) -> Answer:
 
 def covers_many(outer: PolygonSet, boxes: NDArray[np.object_]) -> NDArray[np.bool_]:
     """`covers` for an array (n,) of convex polygons; a boolean array (n,)."""
-    return missed_areas(outer, boxes) <= _SLIVER * shapes.areas(boxes)
+    return missed_areas(outer, boxes) <= SLIVER * shapes.areas(boxes)
 
 
 def missed_areas(outer: PolygonSet, boxes: NDArray[np.object_]) -> NDArray[np.float64]:
@@ -84,9 +84,13 @@ def missed_areas(outer: PolygonSet, boxes: NDArray[np.object_]) -> NDArray[np.fl
     alone = count[owner] == 1
     missed[owner[alone]] = shapes.areas(shapes.difference_many(boxes[owner[alone]], pieces[hit[alone]]))
     for number in np.flatnonzero(count > 1).tolist():
-        together = shapes.union_all(pieces[np.sort(hit[owner == number])].tolist())
-        missed[number] = shapes.difference(boxes[number], together).area
+        missed[number] = shapes.difference(boxes[number], _joined(pieces, hit[owner == number])).area
     return missed
+
+
+def _joined(pieces: NDArray[np.object_], some: NDArray[np.intp]) -> shapes.Shape:
+    """Some pieces as one shape, in their order, on which its rounding hangs."""
+    return shapes.union_all(pieces[np.sort(some)].tolist())
 
 
 def surely_covers_many(outer: Region, boxes: NDArray[np.object_]) -> NDArray[np.bool_]:
@@ -103,8 +107,7 @@ def surely_covers_many(outer: Region, boxes: NDArray[np.object_]) -> NDArray[np.
             pieces, count = shapes.array(outer.pieces), np.bincount(owner, minlength=len(boxes))
             found[owner[shapes.covers_many(pieces[hit], boxes[owner])]] = True
             for number in np.flatnonzero(~found & (count > 1)).tolist():
-                together = shapes.union_all(pieces[np.sort(hit[owner == number])].tolist())
-                found[number] = shapes.covers(together, boxes[number])
+                found[number] = shapes.covers(_joined(pieces, hit[owner == number]), boxes[number])
         case Disc() | Rectangle():
             found = _holds_corners(outer, boxes)
         case Sector() if outer.angle <= math.pi:
@@ -132,7 +135,7 @@ def _holds_corners(convex: Disc | Rectangle | Sector, boxes: NDArray[np.object_]
 
 
 def _together(pieces: Sequence[shapes.Shape], box: Polygon) -> bool:
-    return shapes.difference(box, shapes.union_all(pieces)).area <= _SLIVER * box.area
+    return shapes.difference(box, shapes.union_all(pieces)).area <= SLIVER * box.area
 
 
 def overlaps(left: Region, right: Region) -> Answer:

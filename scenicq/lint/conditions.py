@@ -16,8 +16,10 @@ from shapely.geometry import MultiPolygon, Polygon
 from scenicq.compiler.temporal import is_temporal
 from scenicq.errors import Diagnostic, Span
 from scenicq.forest.bounds import Box, scalar_bounds
+from scenicq.forest.build import opposite
 from scenicq.forest.condition import expand
 from scenicq.forest.nodes import (
+    MIRRORED,
     Compare,
     CompareOp,
     Constant,
@@ -178,15 +180,18 @@ def _order(node: Compare) -> bool | None:
     return None
 
 
+_End = tuple[float, bool, Span | None]
+"""A bound, what breaks a tie between equal ones, and the requirement that it is of."""
+
+
 def _exclusive(scenario: Scenario) -> Iterator[Diagnostic]:
     """Requirements that bound the same number so that nothing is left."""
     numbers = ValueNumbers()
-    ends: dict[int, list[tuple[float, bool, Span | None]]] = {}
+    ends: dict[int, tuple[_End, _End]] = {}
     for requirement in scenario.requirements:
         for compared, op, number in () if requirement.built_in is not None else _bounds(requirement.condition):
-            low, high = ends.setdefault(
-                numbers.expression(compared), [(-math.inf, False, None), (math.inf, False, None)]
-            )
+            which = numbers.expression(compared)
+            low, high = ends.get(which, ((-math.inf, False, None), (math.inf, False, None)))
             strict = op in (CompareOp.LT, CompareOp.GT)
             if op in (CompareOp.LT, CompareOp.LE):
                 high = min(high, (number, not strict, requirement.span), key=lambda end: end[:2])
@@ -201,7 +206,7 @@ def _exclusive(scenario: Scenario) -> Iterator[Diagnostic]:
                         "requirement-never", f"no scene satisfies {beside}", spans[1], "excludes everything",
                     )  # fmt: skip
                 return
-            ends[numbers.expression(compared)] = [low, high]
+            ends[which] = low, high
 
 
 def _bounds(condition: Node) -> Iterator[tuple[Node, CompareOp, float]]:
@@ -211,22 +216,14 @@ def _bounds(condition: Node) -> Iterator[tuple[Node, CompareOp, float]]:
         match stack.pop():
             case Logic(op=LogicOp.AND, args=args):
                 stack += args
-            case Logic(op=LogicOp.NOT, args=(Compare(op, left, right),)) if op in _OPPOSITE:
-                stack.append(Compare(_OPPOSITE[op], left, right))
-            case Compare(op, compared, Constant(value=int() | float() as number)) if op in _MIRRORED:
+            case Logic(op=LogicOp.NOT, args=(Compare() as compare,)):
+                stack.append(opposite(compare))
+            case Compare(op, compared, Constant(value=int() | float() as number)) if op in MIRRORED:
                 yield compared, op, float(number)
-            case Compare(op, Constant(value=int() | float() as number), compared) if op in _MIRRORED:
-                yield compared, _MIRRORED[op], float(number)
+            case Compare(op, Constant(value=int() | float() as number), compared) if op in MIRRORED:
+                yield compared, MIRRORED[op], float(number)
             case _:
                 pass
-
-
-_MIRRORED = {
-    CompareOp.LT: CompareOp.GT, CompareOp.LE: CompareOp.GE, CompareOp.GT: CompareOp.LT, CompareOp.GE: CompareOp.LE,
-}  # fmt: skip
-_OPPOSITE = {
-    CompareOp.LT: CompareOp.GE, CompareOp.LE: CompareOp.GT, CompareOp.GT: CompareOp.LE, CompareOp.GE: CompareOp.LT,
-}  # fmt: skip
 
 
 # --- boxes

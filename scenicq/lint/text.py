@@ -112,6 +112,27 @@ def _is_angle(node: ast.SyntaxNode) -> bool:
             return isinstance(node, ast.Phrase) and node.row.measures == "angle"
 
 
+def _links(chain: ast.ComparisonChain) -> Iterator[tuple[ast.SyntaxNode, str, ast.SyntaxNode]]:
+    """The comparisons of a chain, each with both sides."""
+    sides = [chain.left, *(each.right for each in chain.comparisons)]
+    for (left, right), link in zip(itertools.pairwise(sides), chain.comparisons, strict=True):
+        yield left, link.operator, right
+
+
+def _compared(chain: ast.ComparisonChain) -> list[ast.SyntaxNode]:
+    """The sides of a chain that are compared by order or equality."""
+    return [chain.left, *(each.right for each in chain.comparisons if each.operator in _ORDERS)]
+
+
+def _order_of(chain: ast.ComparisonChain) -> Iterator[tuple[ast.SyntaxNode, ast.SyntaxNode]]:
+    """Which sides of a chain are to be below which others."""
+    for left, operator, right in _links(chain):
+        if operator in ("<", "<="):
+            yield left, right
+        elif operator in (">", ">="):
+            yield right, left
+
+
 def _angles(node: ast.SyntaxNode) -> Iterator[Diagnostic]:
     """Numbers of more than a full turn where an angle stands."""
     places: list[ast.SyntaxNode] = []
@@ -123,7 +144,7 @@ def _angles(node: ast.SyntaxNode) -> Iterator[Diagnostic]:
         case ast.PropertyDefault(name=name) if name in _ANGLE_PROPERTIES:
             places = [node.value]
         case ast.ComparisonChain():
-            sides = [node.left, *(each.right for each in node.comparisons if each.operator in _ORDERS)]
+            sides = _compared(node)
             if any(map(_is_angle, sides)):
                 places = [side for side in sides if not _is_angle(side)]
         case _:
@@ -158,16 +179,6 @@ def _facing_objects(nodes: list[ast.SyntaxNode]) -> Iterator[Diagnostic]:
                 )  # fmt: skip
             case _:
                 pass
-
-
-def _order_of(chain: ast.ComparisonChain) -> Iterator[tuple[ast.SyntaxNode, ast.SyntaxNode]]:
-    """Which sides of a chain are to be below which others."""
-    sides = [chain.left, *(each.right for each in chain.comparisons)]
-    for (left, right), link in zip(itertools.pairwise(sides), chain.comparisons, strict=True):
-        if link.operator in ("<", "<="):
-            yield left, right
-        elif link.operator in (">", ">="):
-            yield right, left
 
 
 def _signed(nodes: list[ast.SyntaxNode]) -> Iterator[Diagnostic]:
@@ -253,7 +264,7 @@ def _fast(node: ast.SyntaxNode) -> Iterator[Diagnostic]:
         case ast.WithSpecifier(property="speed"):
             places = [node.value]
         case ast.ComparisonChain():
-            sides = [node.left, *(each.right for each in node.comparisons if each.operator in _ORDERS)]
+            sides = _compared(node)
             if any(isinstance(side, ast.Attribute) and side.name == "speed" for side in sides):
                 places += sides
         case _:
@@ -286,9 +297,8 @@ def _exact(node: ast.SyntaxNode) -> Iterator[Diagnostic]:
     """Measured numbers that are asked to be a number exactly."""
     if not isinstance(node, ast.ComparisonChain):
         return
-    sides = [node.left, *(each.right for each in node.comparisons)]
-    for (left, right), link in zip(itertools.pairwise(sides), node.comparisons, strict=True):
-        if link.operator != "==" or _is_measured(left) == _is_measured(right):
+    for left, operator, right in _links(node):
+        if operator != "==" or _is_measured(left) == _is_measured(right):
             continue
         measured, number = (left, right) if _is_measured(left) else (right, left)
         if _number(number) is not None:

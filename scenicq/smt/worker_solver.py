@@ -99,7 +99,8 @@ class WorkerSolver:
 
     def loads(self) -> bool:
         """Start the worker; see `Solver.loads`."""
-        self.start()
+        with self._lock:
+            self.start()
         return True
 
     def check(self, problem: Problem, *, precision: float, timeout_s: float) -> Answer:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scenicq.budget import look
 from scenicq.forest.clear_columns import QuickColumns, quick_form
 from scenicq.forest.column_domain import ColumnDomain, first_direction
-from scenicq.forest.columns import DEFINED, UNDEFINED, Coded, Column, column_of, constant_column, truth_of
+from scenicq.forest.columns import DEFINED, UNDEFINED, Coded, Column, arrays_of, column_of, constant_column, truth_of
 from scenicq.forest.columns import UNKNOWN as UNOBSERVED
 from scenicq.forest.condition import expand
 from scenicq.forest.ego_frame import DISTANCE, PLACE
@@ -28,6 +28,7 @@ from scenicq.forest.temporal import Atom
 from scenicq.forest.unobserved import certain_and_possible
 from scenicq.forest.walk import children, is_leaf, leaves, postorder
 from scenicq.limits import LIMITS
+from scenicq.temporal.grouping import alike
 from scenicq.temporal.samples import FIXED, MOVING, BoundSamples, Observed
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
@@ -231,9 +232,9 @@ class AtomColumns:
             if column is None:
                 return np.full(len(self.samples), -1)
             observed &= column.status == DEFINED
-            for part in _parts(column):
+            for part in arrays_of(column.data):
                 _, codes = np.unique(part, return_inverse=True)
-                _, found = np.unique(found * (int(codes.max(initial=0)) + 1) + codes, return_inverse=True)
+                _, found = alike(found * (int(codes.max(initial=0)) + 1) + codes)
         return np.where(observed, found, -1)
 
     def _definition(self, feature: Feature) -> Node | None:
@@ -357,19 +358,6 @@ def _as_truth(found: Column, count: int) -> Truth:
     held = np.where(truth_of(found.data), TRUE, FALSE)
     truth = np.where(found.status == DEFINED, held, np.where(found.status == UNDEFINED, FALSE, UNKNOWN))
     return np.broadcast_to(truth, count).copy()
-
-
-def _parts(column: Column) -> tuple[NDArray[Any], ...]:
-    """The arrays that the values of a feature are made of."""
-    match column.data:
-        case Coded(which):
-            return (which,)
-        case (x, y):
-            return x, y
-        case np.ndarray() as data:
-            return (data,)
-        case _:
-            raise TypeError("no feature is a region")
 
 
 def _as_at(samples: NDArray[np.int64], column: Column) -> Column:

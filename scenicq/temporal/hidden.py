@@ -14,9 +14,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from scenicq.forest.degree import degree
 from scenicq.forest.nodes import (
     Arithmetic,
-    ArithmeticOp,
     Compare,
     CompareOp,
     Constant,
@@ -100,33 +100,6 @@ def _inner(node: Node) -> bool:
     return isinstance(node, Arithmetic | Coordinate | Scale | VectorOf | VectorSum | Select)
 
 
-def _affine(root: Node, leaf: Leaf) -> bool:
-    """Whether an expression is affine in a variable by its form."""
-    hangs: dict[int, bool] = {}
-    for node in postorder((root,)):
-        below = [hangs[id(child)] for child in children(node)]
-        own = getattr(node, "identity", None) is leaf.identity
-        hangs[id(node)] = own or any(below)
-        if not any(below):
-            continue
-        match node:
-            case Arithmetic(op=ArithmeticOp.ADD | ArithmeticOp.SUB | ArithmeticOp.NEG):
-                pass
-            case Arithmetic(op=ArithmeticOp.MUL) if sum(below) == 1:
-                pass
-            case Arithmetic(op=ArithmeticOp.DIV) if not below[1]:
-                pass
-            case Coordinate() | VectorOf() | VectorSum():
-                pass
-            case Scale() if sum(below) == 1:
-                pass
-            case Select() if not below[0]:
-                pass
-            case _:
-                return False
-    return True
-
-
 def has_cuts(condition: Node) -> bool:
     """Whether the comparisons of a condition with random variables have cuts, by its form."""
     try:
@@ -134,7 +107,7 @@ def has_cuts(condition: Node) -> bool:
     except UnclearVariable:
         return False
     return all(
-        len(leaves(each)) == 1 and all(_affine(side, leaf) for side in children(each))
+        len(leaves(each)) == 1 and degree(children(each), {leaf.identity}) <= 1
         for leaf, comparisons in found
         for each in comparisons
     )
@@ -191,7 +164,7 @@ def affine_sides(
     Raises:
         UnclearVariable: The comparison is not affine in the variable, or not of numbers.
     """
-    if not all(_affine(child, leaf) for child in children(node)):
+    if not degree(children(node), {leaf.identity}) <= 1:
         raise UnclearVariable("a comparison that is not affine in a hidden random variable")
     sides: list[NDArray[np.float64]] = []
     unknown: NDArray[np.bool_] | None = None

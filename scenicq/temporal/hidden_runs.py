@@ -140,9 +140,8 @@ class HiddenRuns:
         doubted = thin & (pieces.truth == TRUE)
         if not joint:
             # where other values prove the same, nothing hangs on these
-            width = int(pieces.ends.max(initial=0)) + 1
-            proved = np.unique((pieces.of * width + pieces.ends)[~thin & (pieces.truth == TRUE)])
-            doubted &= ~np.isin(pieces.of * width + pieces.ends, proved)
+            end = pieces.of * (int(pieces.ends.max(initial=0)) + 1) + pieces.ends
+            doubted &= ~np.isin(end, end[~thin & (pieces.truth == TRUE)])
         self._confirm(pieces, np.flatnonzero(doubted), stretches, expanded, hidden)
         look()
         order = np.lexsort((*pieces.low.T[::-1], thin, -pieces.ends, -pieces.truth.astype(np.int64), pieces.of))

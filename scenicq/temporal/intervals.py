@@ -95,14 +95,19 @@ class _Program:
     """What the program says about time with one outcome of its choices, made ready.
 
     Attributes:
-        scenario: The scenario with this outcome.
+        initial: What the labels of starts are matched with.
         machine: What it says; None where it says nothing.
         apart: Whether what is read at the start of a run is another value for each.
     """
 
-    scenario: Scenario
+    initial: InitialScene
     machine: RunMachine | None = field(init=False)
     apart: bool = field(init=False)
+
+    @property
+    def scenario(self) -> Scenario:
+        """The scenario with this outcome."""
+        return self.initial.scenario
 
     def __post_init__(self) -> None:
         """Make ready."""
@@ -161,7 +166,8 @@ class IntervalMatcher:
         for outcome in cast("list[int]", np.unique(table.outcomes).tolist()):
             which = np.flatnonzero(table.outcomes == outcome)
             # a machine has met nothing before, so that what becomes of a block hangs on no other one
-            own, program = table.chosen(which), _Program(self.outcomes[outcome].scenario)
+            own = table.chosen(which)
+            program = _Program(InitialScene(self.outcomes[outcome].scenario, self.match, self.solver))
 
             def remembered(number: int, which: NDArray[np.int64] = which) -> Remembered:
                 return remember(int(order[which[number]]))
@@ -199,8 +205,7 @@ class IntervalMatcher:
     ) -> Runs:  # fmt: skip
         assert program.machine is not None
         if random_variables(expanded):
-            initial = InitialScene(program.scenario, self.match, self.solver)
-            hidden = HiddenRuns(program.machine, initial, self.reasons)
+            hidden = HiddenRuns(program.machine, program.initial, self.reasons)
             return hidden.follow(stretches, columns, expanded, remember)
         return follow_runs(program.machine, stretches, columns.reader(expanded))
 

@@ -1,7 +1,8 @@
 """How often `evaluate` is wrong: datasets in which the truth is known, in more than twenty layouts, by the command.
 
-`python tests/bench/planted.py [--datasets 400] [--drawn 20] [--only NAME] [--page]`. Of each layout recordings are
-drawn anew (`--drawn` times), matched once, and given predictions many times, without and with a difference. The first
+`python tests/bench/planted.py [--datasets 400] [--drawn 20] [--only NAME] [--page]` draws the
+recordings of each layout anew (`--drawn` times), matches them once, and gives them predictions many times, without
+and with a difference. The first
 predictions of each are judged by the installed command, too, which must say the same to the byte. Prints for each
 layout how often objects are told worse or better without being so, how often the command refuses a verdict, the
 power, how often intervals of the difference hold the truth, and how often the recordings are said to speak against a

@@ -42,7 +42,7 @@ from scenicq.match.fields import branch_and_prune, field_solver  # noqa: E402
 from scenicq.match.linear.affine_reach import Reach  # noqa: E402
 from scenicq.match.matcher import Matcher  # noqa: E402
 from scenicq.match.options import MatchOptions  # noqa: E402
-from scenicq.match.problem.outcome import Undecided, finished  # noqa: E402
+from scenicq.match.problem.outcome import Undecided, finish  # noqa: E402
 from scenicq.match.search import backtracking, group_cache, group_plan, label_search  # noqa: E402
 from scenicq.match.search.first_fit import FirstFit  # noqa: E402
 from scenicq.match.tolerance import Tolerance  # noqa: E402
@@ -130,7 +130,7 @@ def _back_by_one(frames: Sequence[Any], failed: Any, *rest: Any) -> None:
 
 def _anew(self: Any, plan: Any, assignment: Mapping[int, int]) -> tuple[Any, Any]:
     with self.trials:
-        return plan.group, finished(self._steps(plan, assignment))
+        return plan.group, finish(self._steps(plan, assignment))
 
 
 _JUMP = backtracking._jump

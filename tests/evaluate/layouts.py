@@ -31,7 +31,7 @@ class Planted:
 
     Attributes:
         name: Its track; unique in its frame.
-        right, ahead: Of the ego, metres.
+        right, ahead: How far it is to the right of the ego and ahead of it, metres.
         rate: Probability that it is missed, without a difference.
         role: Whether it can play the role.
         category: Its class.
@@ -96,7 +96,7 @@ class Layout:
 
         Args:
             recordings: What was drawn.
-            rng: Of luck.
+            rng: Source of luck.
             more: By how much more objects of the role are missed.
         """
         off = self.vary(rng) if self.vary is not None else lambda _number, _each: 0.0
@@ -145,10 +145,10 @@ def predict(layout: Layout, recordings: Sequence[Recording], file: Path, rng: Rn
     """Write predictions: every object where it is, but for those that are missed.
 
     Args:
-        layout: Of which they are.
+        layout: The layout of the recordings.
         recordings: What was drawn.
         file: Where to.
-        rng: Of luck.
+        rng: Source of luck.
         more: By how much more objects of the role are missed.
     """
     told = layout.rates(recordings, rng, more)
@@ -201,7 +201,7 @@ def judge(run: Run, folder: Path, predictions: Path, options: Sequence[str] = ()
 
     Args:
         run: The command.
-        folder: Of what was planted and matched.
+        folder: Where it was planted and matched.
         predictions: The file.
         options: More words.
         truth: By how much more objects of the role are missed.

@@ -14,7 +14,7 @@ from scenicq.errors import DataError, Source
 from scenicq.evaluate.evaluation import evaluate
 from scenicq.evaluate.ranking import rank_results
 from scenicq.evaluate.rows import evaluation_record
-from scenicq.evaluate.weighting import log_weights, weighted
+from scenicq.evaluate.weighting import log_weights, weigh
 from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query
 from scenicq.store.dataset import open_dataset
@@ -90,12 +90,12 @@ def test_few_or_equal_frames_have_equal_weights(values: np.ndarray) -> None:
 
 def test_objects_without_a_density_are_left_out() -> None:
     log_weight = np.array([0.0, math.log(3), math.nan])
-    found = weighted("x", np.array([True, False, True]), log_weight, np.array([0, 1, 1]))
+    found = weigh("x", np.array([True, False, True]), log_weight, np.array([0, 1, 1]))
     assert found.share.rate == pytest.approx(0.25)
     assert (found.objects, found.left_out) == (2, 1)
     assert found.equal == pytest.approx(16 / 10)
     assert "1 without a density are left out" in found.sentence
-    none = weighted("x", np.ones(1, dtype=bool), np.array([math.nan]), np.zeros(1, dtype=int))
+    none = weigh("x", np.ones(1, dtype=bool), np.array([math.nan]), np.zeros(1, dtype=int))
     assert none.sentence.endswith("no density is known")
 
 

@@ -38,7 +38,7 @@ from scenicq.match.fields import field_solver
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.evaluation import replay
-from scenicq.match.problem.outcome import Refuted, Satisfied, finished
+from scenicq.match.problem.outcome import Refuted, Satisfied, finish
 from scenicq.match.tolerance import EXACT, parse_tolerance
 from scenicq.match.verdict import Match, Unknown
 from scenicq.query.execution.lazy_solver import LazySolver
@@ -349,7 +349,7 @@ def about_fields(stores: Stores, **_: object) -> Facts:
             seen = [car.seen(rng.choice((value, rng.uniform(0.0, 6.0))), rng) for car in cars]
             shared = between(0.0, 6.0)
             parts = [car.items(shared, each) for car, each in zip(cars, seen, strict=True)]
-            outcome = finished(field_solver.search_directions(parts, shared.identity, EXACT))
+            outcome = finish(field_solver.search_directions(parts, shared.identity, EXACT))
             if not isinstance(outcome, Refuted):
                 found[(number,)] = "match" if isinstance(outcome, Satisfied) else "unknown"
     return found

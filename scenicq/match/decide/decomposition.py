@@ -24,8 +24,8 @@ from scenicq.match.problem.outcome import (
     Satisfied,
     SearchSteps,
     Undecided,
-    finished,
-    finished_together,
+    finish,
+    finish_together,
 )
 from scenicq.match.tolerance import SLACK, Tolerance
 
@@ -40,7 +40,7 @@ _FEW_OPTIONS = 8
 
 def decide_decomposed(items: list[Item], tolerance: Tolerance) -> Outcome:
     """What `search_decomposed` finds, whatever it takes."""
-    return finished(search_decomposed(items, tolerance))
+    return finish(search_decomposed(items, tolerance))
 
 
 def search_decomposed(items: list[Item], tolerance: Tolerance, known: KnownCases | None = None) -> SearchSteps:
@@ -95,7 +95,7 @@ def _all(parts: Sequence[list[Item]], items: list[Item], tolerance: Tolerance, k
     """Parts that have no random variable in common."""
     values: dict[Identity, Value] = {}
     doubt: Undecided | None = None
-    for outcome in (yield from finished_together([search_decomposed(part, tolerance, known) for part in parts])):
+    for outcome in (yield from finish_together([search_decomposed(part, tolerance, known) for part in parts])):
         if isinstance(outcome, Refuted):
             return outcome
         if isinstance(outcome, Undecided):

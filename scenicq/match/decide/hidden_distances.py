@@ -16,7 +16,7 @@ from shapely.geometry import Polygon
 
 from scenicq.forest.bounds import Box, vector_bounds
 from scenicq.forest.groups import Comparison
-from scenicq.forest.nodes import Compare, CompareOp, Constant, Contains, Distance, Node
+from scenicq.forest.nodes import MIRRORED, Compare, CompareOp, Constant, Contains, Distance, Node
 from scenicq.geometry import shapes
 from scenicq.geometry.membership import distance
 from scenicq.geometry.regions import Nowhere, PolygonSet, PolylineSet, Region, UnionOf
@@ -62,14 +62,6 @@ def with_areas(items: Sequence[Item], tolerance: Tolerance, *, outer: bool = Tru
     return found if changed else None
 
 
-_TURNED = {
-    CompareOp.LT: CompareOp.GT,
-    CompareOp.LE: CompareOp.GE,
-    CompareOp.GT: CompareOp.LT,
-    CompareOp.GE: CompareOp.LE,
-}
-
-
 @dataclass(frozen=True, slots=True)
 class _Asked:
     """A distance of a point from a region that is at most (else at least) a limit in metres."""
@@ -85,11 +77,11 @@ def _distance_of(node: Node) -> _Asked | None:
     match node:
         case Compare(op, Distance(Constant(value=value), point), Constant(value=float() as limit)):
             pass
-        case Compare(op, Constant(value=float() as limit), Distance(Constant(value=value), point)) if op in _TURNED:
-            op = _TURNED[op]
+        case Compare(op, Constant(value=float() as limit), Distance(Constant(value=value), point)) if op in MIRRORED:
+            op = MIRRORED[op]
         case _:
             return None
-    if op not in _TURNED or isinstance(point, Constant) or not isinstance(value, Region):
+    if op not in MIRRORED or isinstance(point, Constant) or not isinstance(value, Region):
         return None
     return _Asked(value, point, op in (CompareOp.LT, CompareOp.LE), limit)
 

@@ -25,7 +25,7 @@ from scenicq.match.fields.heading_propagation import DirectedCases, KnownCases, 
 from scenicq.match.fields.shared_variable import find_shared_value, joined
 from scenicq.match.fields.witness_search import THOROUGH, find_witness
 from scenicq.match.problem.conditioned import Item, conditioned
-from scenicq.match.problem.outcome import Outcome, Patience, Refuted, Satisfied, SearchSteps, Undecided, finished
+from scenicq.match.problem.outcome import Outcome, Patience, Refuted, Satisfied, SearchSteps, Undecided, finish
 from scenicq.match.tolerance import Tolerance
 
 __all__ = ["repaired", "search_directions"]
@@ -186,7 +186,7 @@ def repaired(items: Sequence[Item], near: Mapping[Identity, Value], tolerance: T
     if len(given) < len(set(discrete)):
         return None
     network = ConstraintNetwork(conditioned(items, given), tolerance)
-    found = finished(_alone(BoxSet.around(network, near, _CLOSE), items[0][0], tolerance))
+    found = finish(_alone(BoxSet.around(network, near, _CLOSE), items[0][0], tolerance))
     return Satisfied({**given, **found.values}) if isinstance(found, Satisfied) else None
 
 

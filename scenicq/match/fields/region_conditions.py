@@ -15,7 +15,7 @@ from scenicq.forest.nodes import Contains, DiscAt, Encloses, Intersects, Node, R
 from scenicq.geometry import shapes
 from scenicq.geometry.angles import normalize_array
 from scenicq.geometry.boxes import box_polygons
-from scenicq.geometry.containment import missed_areas, surely_covers_many
+from scenicq.geometry.containment import SLIVER, missed_areas, surely_covers_many
 from scenicq.geometry.membership import may_be_within
 from scenicq.geometry.proximity import meets_many
 from scenicq.geometry.regions import PolygonSet, Region
@@ -29,8 +29,6 @@ RegionCondition = Contains | Intersects | Encloses
 
 _Mask = NDArray[np.bool_]
 _Numbers = NDArray[np.float64]
-_SLIVER = 1e-9
-"""Share of a box's area that may be missing where it counts as enclosed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +115,7 @@ def _may_enclose(outer: Region, box: _Shapes, some: NDArray[np.intp], *, wanted:
     if isinstance(outer, PolygonSet):
         inner = np.flatnonzero(found & shapes.are_there(box.inner[some]))
         missed = missed_areas(outer, box.inner[some][inner])
-        found[inner] = missed <= _SLIVER * shapes.areas(box.outer[some][inner])
+        found[inner] = missed <= SLIVER * shapes.areas(box.outer[some][inner])
     return found
 
 

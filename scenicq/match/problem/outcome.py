@@ -20,8 +20,8 @@ __all__ = [
     "Search",
     "SearchSteps",
     "Undecided",
-    "finished",
-    "finished_together",
+    "finish",
+    "finish_together",
 ]
 
 
@@ -125,7 +125,7 @@ class Search:
         return self._outcome
 
 
-def finished(steps: SearchSteps) -> Outcome:
+def finish(steps: SearchSteps) -> Outcome:
     """The outcome, whatever it takes.
 
     Raises:
@@ -136,7 +136,7 @@ def finished(steps: SearchSteps) -> Outcome:
     return outcome
 
 
-def finished_together(all_steps: Sequence[SearchSteps]) -> Generator[Patience, None, list[Outcome]]:
+def finish_together(all_steps: Sequence[SearchSteps]) -> Generator[Patience, None, list[Outcome]]:
     """The outcomes of questions that all have to be satisfied; of the one that is refuted alone if one is."""
     searches = [Search(steps) for steps in all_steps]
     for patience in Patience:

@@ -22,7 +22,7 @@ from scenicq.match.fields import field_solver, shared_variable
 from scenicq.match.fields.shared_variable import find_shared_value, joined
 from scenicq.match.linear.linear_relaxation import extent_affine
 from scenicq.match.problem.evaluation import replay
-from scenicq.match.problem.outcome import Refuted, Satisfied, Undecided, finished
+from scenicq.match.problem.outcome import Refuted, Satisfied, Undecided, finish
 from scenicq.match.tolerance import EXACT, Tolerance
 
 from .patchwork import HEADINGS, SIDE, Beside, patchwork
@@ -138,7 +138,7 @@ def test_parts_suit_each_other_exactly_where_arithmetic_says_so(far, monkeypatch
         seen = [car.seen(rng.choice((value, value, rng.uniform(0.0, 6.0))), rng) for car in cars]
         shared = between(0.0, 6.0)
         parts = [car.items(shared, each) for car, each in zip(cars, seen, strict=True)]
-        outcome = finished(field_solver.search_directions(parts, shared.identity, EXACT))
+        outcome = finish(field_solver.search_directions(parts, shared.identity, EXACT))
         may, must = (
             any(
                 max(low for low, _ in some) <= min(high for _, high in some)
@@ -173,7 +173,7 @@ def test_parts_that_ask_for_one_direction_get_one(monkeypatch):
         field, shared = patchwork(rng, 4), between(0.0, 4 * SIDE)
         heading = DirectionAt(Constant(field), VectorOf(shared, c(rng.uniform(0.1, 3.9))))
         parts = [[compared("heading", build.add(heading, between(-0.1, 0.1)), rng.choice(HEADINGS))] for _ in range(2)]
-        outcome = finished(field_solver.search_directions(parts, shared.identity, EXACT))
+        outcome = finish(field_solver.search_directions(parts, shared.identity, EXACT))
         one, other = (part[0][2] for part in parts)
         assert isinstance(outcome, Satisfied if one == other and one in field.tiles[:, 0] else Refuted)
         if isinstance(outcome, Satisfied):
