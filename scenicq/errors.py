@@ -99,6 +99,7 @@ CODES: dict[str, str] = {
     # the answers
     "frame-excluded": "what a frame shows is not what the program allows",
     "never-compared": "the program sets what no label of the dataset has",
+    "class-absent": "the program has a role for a class that no label object of the dataset has",
     "no-tracks": "a program over time, and objects of which nothing says that they are the same in several labels",
     # what compiles but cannot be meant
     "angle-without-deg": "an angle of more than a full turn, which may be meant in degrees",
