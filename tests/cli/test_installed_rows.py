@@ -16,7 +16,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "importers"))
 
 from full_sources import FORMATS, entries, full
 
-from scenicq_cli.cache import user_cache
+from scenicq_cli.user_folders import user_cache
 
 SAMPLES = Path(__file__).parents[2] / "sample_data"
 A = "in everywhere, facing Range(0, 360) deg"
