@@ -39,7 +39,10 @@ from scenicq.match.search.group_plan import GroupPlan
 if TYPE_CHECKING:  # takes long to load
     from scenicq.match.fields.heading_propagation import DirectedCases, KnownCases
 
-__all__ = ["GroupCache", "known_of", "surely", "translated"]
+__all__ = ["POSTPONED", "GroupCache", "known_of", "surely", "translated"]
+
+POSTPONED = "postponed"
+"""The reason of what is undecided for want of patience alone."""
 
 
 @dataclass(eq=False, slots=True)
@@ -95,7 +98,7 @@ class GroupCache:
         group, search = known
         with self.trials:
             outcome = search.within(self.patience)
-        return group, Undecided(group.constraints[0], "postponed") if outcome is None else outcome
+        return group, Undecided(group.constraints[0], POSTPONED) if outcome is None else outcome
 
     def _steps(self, plan: GroupPlan, assignment: Mapping[int, int]) -> SearchSteps:
         outcome = self._in_closed_form(plan, assignment) or (yield from self._by_cascade(plan.group, assignment))
