@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import TYPE_CHECKING
 
+from scenicq.compiler.other_objects import count, nearest, others
 from scenicq.compiler.values import Builtin, ModelValue
 
 if TYPE_CHECKING:
@@ -20,7 +21,7 @@ __all__ = ["LABELS", "QUESTIONS", "question_names"]
 LABELS = "scenicq.labels"
 """What programs call the module."""
 
-QUESTIONS: Mapping[str, Callable[..., ModelValue]] = {}
+QUESTIONS: Mapping[str, Callable[..., ModelValue]] = {"others": others, "count": count, "nearest": nearest}
 """What each name of the module does: a function of the interpreter, the place of the call, and what it is given."""
 
 

@@ -7,10 +7,14 @@ so on.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from scenicq.errors import Span
 from scenicq.forest.compute import fold
 from scenicq.forest.nodes import (
+    MIRRORED,
+    Among,
+    AmongOp,
     Arithmetic,
     ArithmeticOp,
     Bearing,
@@ -82,8 +86,39 @@ def minus(left: Node, right: Node, span: Span | None = None) -> Node:
 
 
 def compare(op: CompareOp, left: Node, right: Node, span: Span | None = None) -> Node:
-    """A comparison."""
+    """A comparison; of how many label objects there are with a number, whether there are at least so many."""
+    for one, other, way in ((left, right, op), (right, left, MIRRORED.get(op, op))):
+        if isinstance(one, Among) and one.op is AmongOp.COUNT and isinstance(other, Constant):
+            if isinstance(other.value, float) and abs(other.value) < _MANY:
+                return _count_against(one, way, other.value, span)
     return fold(Compare(op, left, right, span=span))
+
+
+_MANY = 1e9
+
+
+def _count_against(many: Among, op: CompareOp, number: float, span: Span | None) -> Node:
+    def at_least(least: int) -> Node:
+        if least <= 0:
+            return constant(True, span)
+        return replace(many, op=AmongOp.AT_LEAST, kind="boolean", number=least, span=span)
+
+    match op:
+        case CompareOp.GE:
+            return at_least(math.ceil(number))
+        case CompareOp.GT:
+            return at_least(math.floor(number) + 1)
+        case CompareOp.LT:
+            return opposite(at_least(math.ceil(number)))
+        case CompareOp.LE:
+            return opposite(at_least(math.floor(number) + 1))
+        case _ if number != math.floor(number):
+            return constant(op is CompareOp.NE, span)
+        case _:
+            more = opposite(at_least(int(number) + 1))
+            least = at_least(int(number))
+            same = more if isinstance(least, Constant) else logic(LogicOp.AND, least, more, span=span)
+            return same if op is CompareOp.EQ else opposite(same)
 
 
 def logic(op: LogicOp, *args: Node, span: Span | None = None) -> Node:

@@ -6,6 +6,7 @@ import itertools
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
+from scenicq.forest.among import Elements
 from scenicq.forest.nodes import Value
 from scenicq.forest.scenario import Scenario
 from scenicq.limits import LIMITS, exhausted
@@ -14,7 +15,7 @@ from scenicq.match.problem.bipartite_matching import Slot, matchable
 from scenicq.match.problem.constraints import Signature
 from scenicq.match.problem.observation import observe, observe_params
 from scenicq.match.verdict import Cause
-from scenicq.store.classes import class_matches
+from scenicq.store.classes import Granularity, class_matches
 from scenicq.store.labels import Label
 
 __all__ = ["Candidates", "LabelProblem", "candidates_of", "egos", "find_candidates", "nearest_first", "ranks"]
@@ -51,7 +52,7 @@ def nearest_first(label: Label, ego: int, candidates: Candidates) -> Candidates:
     return {index: tuple(sorted(numbers, key=rank)) for index, numbers in candidates.items()}
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True, eq=False)
 class LabelProblem:
     """A label made ready: its label objects by number (0 is the label's ego) and who may play whom.
 
@@ -64,6 +65,8 @@ class LabelProblem:
             order in which they are tried.
         ranks: That order.
         disc: The area that is looked at, if it is limited: centre and radius.
+        classes: How classes are compared.
+        elements: The label objects for conditions that go through all of them, once one has been asked.
     """
 
     label: Label
@@ -73,6 +76,8 @@ class LabelProblem:
     candidates: Mapping[int, tuple[int, ...]]
     ranks: Mapping[int, int]
     disc: tuple[tuple[float, float], float] | None
+    classes: Granularity = "fine"
+    elements: Elements | None = None
 
     def signatures(
         self, relevant: tuple[frozenset[str], ...]
@@ -149,7 +154,7 @@ def find_candidates(
     order = ranks(label, ego, candidates.values())
     candidates = {index: tuple(sorted(numbers, key=order.__getitem__)) for index, numbers in candidates.items()}
     seen = tuple(map(observe, label_objects))
-    return LabelProblem(label, ego, seen, observe_params(label), candidates, order, disc)
+    return LabelProblem(label, ego, seen, observe_params(label), candidates, order, disc, options.classes)
 
 
 def candidates_of(

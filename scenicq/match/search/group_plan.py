@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
 
+from scenicq.forest.among import asks_others
 from scenicq.forest.groups import Group
+from scenicq.forest.nodes import Node
 from scenicq.forest.scenario import Scenario
 from scenicq.match.decide.closed_form import ClosedForm
 from scenicq.match.decide.closed_forms import closed_form_of
@@ -82,9 +84,10 @@ def make_plan(scenario: Scenario, signature: Signature, options: MatchOptions, k
         for part in subgroups_of(group, scenario.ego):
             small = shape_of(part, scenario.ego, options.tolerance)
             number = kinds.setdefault(small.key, len(kinds))
-            parts.append(GroupPlan(part, number, small.roles, closed_form_of(part, scenario.ego)))
+            small_form = None if asks_others(*_expressions(part)) else closed_form_of(part, scenario.ego)
+            parts.append(GroupPlan(part, number, small.roles, small_form))
         number = kinds.setdefault(shape.key, len(kinds))
-        form = None if group.doubtful else closed_form_of(group, scenario.ego)
+        form = None if group.doubtful or asks_others(*_expressions(group)) else closed_form_of(group, scenario.ego)
         groups.append(GroupPlan(group, number, shape.roles, form, tuple(parts), Relaxation.of(group)))
         paired = [part.roles for part in parts if len(part.roles) > 1]
         # of a chain, the next one is what can be checked next
@@ -105,3 +108,7 @@ def make_plan(scenario: Scenario, signature: Signature, options: MatchOptions, k
         {index: frozenset(others - {index}) for index, others in links.items()},
         signature,
     )
+
+
+def _expressions(group: Group) -> list[Node]:
+    return [each.expression for each in group.constraints]

@@ -138,7 +138,7 @@ class LabelSearch:
             ended = error
         heapq.heapify(waiting)
         while waiting:
-            place, number, solution, found = heapq.heappop(waiting)
+            _, number, solution, found = heapq.heappop(waiting)
             if solution is not None and self._is_new(solution[1].assignment, twins):
                 yield solution
             try:
@@ -387,6 +387,7 @@ class LabelSearch:
         for group in plan.joint:
             for index in group.roles:
                 due.setdefault(index, []).append((group, frozenset(group.roles)))
+
         def check(slot: int, assignment: Mapping[int, int]) -> tuple[Consistency, frozenset[int]]:
             for whole, part, roles in parts.get(slot, ()):
                 ready = whole in refuted and roles <= assignment.keys()
@@ -455,10 +456,12 @@ class LabelSearch:
             return Satisfied({})
         try:
             outcome = self.ask([self.items(each.group, assignment) for each in plan.groups])
-            doubtful = [each.group for each in plan.groups if each.group.doubtful]
+            groups = [each.group for each in plan.groups]
+            doubtful = [group for group in groups if group.doubtful or self._decisions.has_doubts(group, assignment)]
             if doubtful and isinstance(outcome, Satisfied):
-                sure = [surely(each.group) if each.group.doubtful else each.group for each in plan.groups]
-                outcome = known_of(doubtful[0], self.ask([self.items(group, assignment) for group in sure]))
+                sure = [surely(group) if group.doubtful else group for group in groups]
+                items = [self._decisions.items(group, assignment, surely=True) for group in sure]
+                outcome = known_of(doubtful[0], self.ask(items))
             return outcome
         except CannotEvaluate as error:
             return Undecided(plan.groups[0].group.constraints[0], f"unsupported: {error}")
