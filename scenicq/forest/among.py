@@ -90,7 +90,12 @@ def among_column(node: Among, inputs: Sequence[Column], elements: Elements) -> C
     rows = np.flatnonzero(counts)
     counts, place = counts[rows], place[rows]
     given = inputs[node.excluded :]
-    domain = ColumnDomain(lambda feature: _read(feature, rows, place, n, given, elements), _drawn, first_direction)
+    domain = ColumnDomain(
+        lambda feature: _read(feature, rows, place, n, given, elements),
+        _drawn,
+        first_direction,
+        others=lambda inner, args: among_column(inner, args, _of_rows(elements, place, n)),
+    )
     with np.errstate(all="ignore"):
         found = interpret(_steps(node.body), domain)
     holds = _truths(found[id(node.body.condition)], len(rows))
@@ -107,6 +112,25 @@ def among_column(node: Among, inputs: Sequence[Column], elements: Elements) -> C
         return Column(surely.astype(np.float64), np.maximum(unknown, np.where(possibly > surely, UNKNOWN, DEFINED)))
     open_ = (possibly >= node.number) & (surely < node.number)
     return Column(surely >= node.number, np.maximum(unknown, np.where(open_, UNKNOWN, DEFINED)))
+
+
+def _of_rows(elements: Elements, place: NDArray[np.intp], n: int) -> Elements:
+    """The label objects of the place of each row, where each row is a place."""
+    sizes = np.bincount(elements.place, minlength=n)
+    firsts = np.cumsum(sizes) - sizes
+    mine = sizes[place]
+    ends = np.cumsum(mine)
+    which = np.arange(int(mine.sum())) - np.repeat(ends - mine - firsts[place], mine)
+
+    def observed(name: str) -> Column:
+        found = elements.observed(name)
+        whole = len(elements.place)
+        return Column(_taken(found.data, which, whole), np.broadcast_to(found.status, whole)[which])
+
+    return Elements(
+        np.repeat(np.arange(len(place)), mine), elements.known[place], elements.ids[which],
+        lambda category: elements.belongs(category)[which], observed,
+    )  # fmt: skip
 
 
 def _nearest(
