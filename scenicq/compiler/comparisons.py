@@ -246,6 +246,7 @@ def iterate(value: ModelValue, span: Span) -> list[ModelValue]:
         raise fail("random-branch", "a random list cannot be gone through", span, "random here",
                    ("use `Uniform(*list)` to pick one of its items",))  # fmt: skip
     if isinstance(value, LabelObjects | Gathered):
-        raise fail("unsupported-construct", "the other label objects cannot be gone through one by one", span,
-                   "not a list", ("ask with `any(... for c in others(C))`, `all(...)`, `len([...])`, or `count(C)`",))  # fmt: skip
+        hint = "ask with `any(... for c in others(C))`, `all(...)`, `len([...])`, or `count(C)`"
+        what = "the other label objects cannot be gone through one by one"
+        raise fail("unsupported-construct", what, span, "not a list", (hint,))
     raise fail("wrong-type", f"{describe(value)} cannot be gone through", span, "not a list")

@@ -25,12 +25,15 @@ from scenicq.forest.nodes import (
     Among,
     AmongOp,
     Body,
+    Compare,
+    CompareOp,
     Constant,
     DirectionAt,
     Feature,
     Index,
     LogicOp,
     Node,
+    Select,
 )
 from scenicq.forest.walk import children, is_leaf, leaves, postorder, rebuild
 
@@ -110,7 +113,9 @@ def is_nearest(one: Instance, other: Nearest, span: Span) -> Node:
     )
     is_there = _among(AmongOp.AT_LEAST, objects, element, _both((same, counts), span), span)
     someone = _among(AmongOp.AT_LEAST, objects, element, _both((build.opposite(same), counts, before), span), span)
-    return _both((is_there, build.opposite(someone)), span)
+    # where it is not seen, nothing is known of it, also where nobody is
+    seen = Compare(CompareOp.EQ, _who(one, IDENTITY, span), _who(one, IDENTITY, span), span=span)
+    return Select(seen, (build.constant(False), _both((is_there, build.opposite(someone)), span)), span=span)
 
 
 def gathered(
@@ -162,7 +167,8 @@ _FILTERS = ("within",)
 
 
 def _class(
-    run: Interpreter, span: Span, name: str, args: tuple[ModelValue, ...], named: Mapping[str, ModelValue], filters: tuple[str, ...]
+    run: Interpreter, span: Span, name: str, args: tuple[ModelValue, ...], named: Mapping[str, ModelValue],
+    filters: tuple[str, ...],
 ) -> ScenicClass:  # fmt: skip
     """The class that a function is asked about, in a condition."""
     if run.course is None:
@@ -217,7 +223,7 @@ def _among(
     """Something about all of some label objects, closed over what is given from around.
 
     Raises:
-        ScenarioError: unsupported-construct, where what is asked of each hangs on chance or on a direction at its place.
+        ScenarioError: unsupported-construct, where what is asked of each hangs on chance, or on a direction.
     """
     given: dict[int, Node] = {}
     excluded = objects.excluded

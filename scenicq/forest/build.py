@@ -88,9 +88,11 @@ def minus(left: Node, right: Node, span: Span | None = None) -> Node:
 def compare(op: CompareOp, left: Node, right: Node, span: Span | None = None) -> Node:
     """A comparison; of how many label objects there are with a number, whether there are at least so many."""
     for one, other, way in ((left, right, op), (right, left, MIRRORED.get(op, op))):
-        if isinstance(one, Among) and one.op is AmongOp.COUNT and isinstance(other, Constant):
-            if isinstance(other.value, float) and abs(other.value) < _MANY:
-                return _count_against(one, way, other.value, span)
+        match one, other:
+            case Among(op=AmongOp.COUNT), Constant(value=float() as number) if abs(number) < _MANY:
+                return _count_against(one, way, number, span)
+            case _:
+                pass
     return fold(Compare(op, left, right, span=span))
 
 

@@ -22,7 +22,8 @@ from scenicq.geometry.regions import Region
 
 __all__ = [
     "ELEMENT", "GIVEN", "IDENTITY", "MIRRORED", "RANK", "TRACK",
-    "Among", "AmongOp", "Arithmetic", "ArithmeticOp", "Bearing", "Body", "Compare", "CompareOp", "Constant", "Contains", "Coordinate",
+    "Among", "AmongOp", "Arithmetic", "ArithmeticOp", "Bearing", "Body", "Compare", "CompareOp", "Constant",
+    "Contains", "Coordinate",
     "DirectionAt", "DiscAt", "DiscreteRange", "Distance", "Encloses", "Feature", "Identity", "Index", "Intersects",
     "Kind", "Leaf", "Logic", "LogicOp", "Node", "Norm", "Normal", "PointIn", "Range", "RectangleAt",
     "RegionDifference", "RegionIntersection", "RegionUnion", "Rotate", "Scale", "SectorAt", "Select",

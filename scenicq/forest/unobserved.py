@@ -83,6 +83,9 @@ class _Reader:
         self._known: dict[int, int] = {}
         self._alive: list[Node] = []  # as numbers are known by ids
 
+    def _hides(self, node: Node) -> bool:
+        return isinstance(node, Feature | Among) and self._unobserved(node)
+
     def _number(self, node: Node) -> int:
         self._alive.append(node)
         return self._numbers.expression(node, known=self._known)

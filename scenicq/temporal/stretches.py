@@ -142,9 +142,7 @@ class Stretches(Timeline):
         return self.beginning(number).some(np.arange(first, end))
 
 
-def stretches_of(
-    table: StartTable, gap_s: float, *, apart: bool, classes: Granularity = "fine"
-) -> Iterator[Stretches]:
+def stretches_of(table: StartTable, gap_s: float, *, apart: bool, classes: Granularity = "fine") -> Iterator[Stretches]:
     """The stretches that starts make, so many at a time that they stay in memory.
 
     Args:

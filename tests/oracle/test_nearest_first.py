@@ -80,7 +80,11 @@ class Program:
         """The program."""
         made = [f"{name} = new {kind} at (Range(-99, 99), Range(-99, 99)), facing 0, with width 2\n"
                 for name, kind in {"ego": "Object", **self.roles}.items()]  # fmt: skip
-        return "model scenic.domains.driving.model\n" + "".join(made) + "".join(f"require {each.text}\n" for each in self.asked)
+        return (
+            "model scenic.domains.driving.model\n"
+            + "".join(made)
+            + "".join(f"require {each.text}\n" for each in self.asked)
+        )
 
     def correspondences(self, label: Label) -> list[dict[str, str]]:
         """All that hold, in order."""
@@ -161,7 +165,9 @@ def test_the_nearest_correspondence_comes_first(way, monkeypatch):
 
 def lines(*words: object) -> str:
     """What the command says."""
-    run = subprocess.run([COMMAND, "match", *map(str, words), "--exit-zero"], capture_output=True, text=True, check=True)
+    run = subprocess.run(
+        [COMMAND, "match", *map(str, words), "--exit-zero"], capture_output=True, text=True, check=True
+    )
     return run.stdout
 
 

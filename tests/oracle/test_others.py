@@ -120,7 +120,9 @@ def of_one(draw: random.Random, name: str, roles: list[str], depth: int = 1) -> 
         case "and" if depth:
             one, other = of_one(draw, name, roles, depth - 1), of_one(draw, name, roles, depth - 1)
             word, joined = draw.choice([("and", both), ("or", either)])
-            return OfOne(f"(({one.text}) {word} ({other.text}))", lambda w, c: joined(one.holds(w, c), other.holds(w, c)))
+            return OfOne(
+                f"(({one.text}) {word} ({other.text}))", lambda w, c: joined(one.holds(w, c), other.holds(w, c))
+            )
         case _:
             return OfOne(f"{name}.position.x > {limit - 8}", lambda w, c: c.x > limit - 8)
 
@@ -149,7 +151,9 @@ def inside(draw: random.Random) -> tuple[str, Callable[[World, LabelObject], Tru
 def asked(draw: random.Random, roles: list[str], depth: int = 1) -> Asked:
     """A condition on others."""
     kind, number, op = draw.choice(ASKED), draw.randint(0, 3), draw.choice(list(OPS))
-    form = draw.choice(["any", "all", "filtered", "every", "len", "all others", "count", "nearest", "pair", "not", "or"])
+    form = draw.choice(
+        ["any", "all", "filtered", "every", "len", "all others", "count", "nearest", "pair", "not", "or"]
+    )
     match form:
         case "any" | "filtered":
             one, also = of_one(draw, "c", roles), of_one(draw, "c", roles)
@@ -255,7 +259,9 @@ def expected(kinds: dict[str, str], conditions: list[Asked], label: Label, way: 
     found: list[tuple[Truth, World]] = []
     for ego in egos:
         near = sorted((e for e in everyone if e.id != ego.id), key=lambda e: (distance(e, ego), e.id))
-        options = [[e for e in near if World((), {}, coarse).is_of(e, kind) is True] for kind in list(kinds.values())[1:]]
+        options = [
+            [e for e in near if World((), {}, coarse).is_of(e, kind) is True] for kind in list(kinds.values())[1:]
+        ]
         for chosen in itertools.product(*options):
             if len({each.id for each in chosen}) == len(chosen):
                 world = World(everyone, dict(zip(kinds, (ego, *chosen), strict=True)), coarse)
@@ -342,3 +348,95 @@ def test_frames_are_those_of_plain_enumeration(tmp_path, seed):
 def test_many_frames_are_those_of_plain_enumeration(tmp_path):
     for seed in range(100, 120):
         run_frames(tmp_path / f"{seed}", seed, 60)
+
+
+# --- over time
+
+
+def random_recording(draw: random.Random, name: str) -> Recording:
+    """Ten samples, half a second apart; tracks come and go."""
+    first = label_objects(draw)
+    labels: list[Label] = []
+    for n in range(10):
+        seen = [
+            replace(each, id=f"{each.id}-{n}", x=each.x + draw.randint(-1, 1) + 0.25 * n, velocity=(3.0, 0.0),
+                    heading=draw.choice([each.heading, 1.0]))
+            for each in first
+            if draw.random() < 0.85
+        ]  # fmt: skip
+        labels.append(Label(f"{name}-{n}", name, n * 500_000, "street", EGO, tuple(seen)))
+    return Recording(name, "street", tuple(labels))
+
+
+def over_time(kind: str, truths: list[Truth]) -> Truth:
+    return both(*truths) if kind == "always" else either(*truths)
+
+
+def run_time(folder: Path, seed: int, programs: int) -> Counter[str]:
+    """Intervals of a fixed length, each from its own start, with whoever plays the roles."""
+    draw, seen = random.Random(seed), Counter[str]()
+    recordings = [random_recording(draw, f"r{n}") for n in range(4)]
+    write_dataset(folder, recordings, {}, name="d")
+    dataset = open_dataset(folder)
+    for number in range(programs):
+        roles = {"ego": "Car", "a": "Car"}
+        kind, condition = draw.choice(["always", "eventually"]), asked(draw, list(roles))
+        steps = draw.choice([1, 2, 4])
+        form = draw.choice(["require", "monitor"] if kind == "always" else ["require"])
+        lines = [f"require {kind} ({condition.text})"]
+        if form == "monitor":
+            lines = [
+                f"monitor Holds():\n    while True:\n        require {condition.text}\n        wait",
+                "require monitor Holds()",
+            ]
+        text = text_of(roles, [*lines, f"terminate after {steps * 0.5} seconds"])
+        prefilter = number % 2 == 0
+        options = QueryOptions(
+            prefilter=prefilter, time=IntervalOptions(intervals="all"), interval_reasons=number % 3 > 0
+        )
+        try:
+            results = list(Query(dataset, Source("p.scenic", text), options).results())
+        except ScenarioError as error:
+            assert error.diagnostics[0].code == "impossible-requirement", text
+            continue
+        told: dict[tuple[str, str, str, str], Truth] = {}
+        for each in results:
+            truth = True if isinstance(each.verdict, Match) else None if isinstance(each.verdict, Unknown) else False
+            told[each.recording, each.verdict.correspondence["a"], each.frame, each.interval.last] = truth
+        for recording in recordings:
+            judge_recording(text, recording, (kind, form), condition, steps, told, seen)
+    return seen
+
+
+def judge_recording(text, recording, kind, condition, steps, told, seen):
+    labels = recording.labels
+    for track in sorted({each.track for label in labels for each in label.objects}):
+        for i in range(len(labels) - steps):
+            j = i + steps
+            own = [next((e for e in label.objects if e.track == track), None) for label in labels[i : j + 1]]
+            # the role lives from the start to the end; a gap of a sample or two is none
+            if own[0] is None or own[-1] is None or own[0].category != "Car":
+                continue
+            if any(a is b is c is None for a, b, c in zip(own, own[1:], own[2:], strict=False)):
+                continue
+            truths = []
+            for label, mine in zip(labels[i : j + 1], own, strict=True):
+                objects = (label.ego, *label.objects)
+                truths.append(condition.holds(World(objects, {"ego": label.ego, "a": mine})))
+            # a run ends before its monitors come to the last sample
+            expect = over_time(kind[0], truths[:-1] if kind[1] == "monitor" else truths)
+            found = told.get((recording.name, track, labels[i].frame, labels[j].frame), False)
+            seen[{True: "match", None: "unknown", False: "no"}[expect]] += 1
+            assert found == expect, (text, recording.name, track, i, truths, found)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_intervals_are_those_of_plain_enumeration(tmp_path, seed):
+    seen = run_time(tmp_path / "d", seed, 16)
+    assert min(seen["match"], seen["unknown"], seen["no"]) > 10
+
+
+@pytest.mark.slow
+def test_many_intervals_are_those_of_plain_enumeration(tmp_path):
+    for seed in range(100, 115):
+        run_time(tmp_path / f"{seed}", seed, 40)

@@ -307,9 +307,7 @@ class RecordingMatcher:
             mine = slice(ends[place], ends[place + 1])
             among: Mapping[int, tuple[int, ...]] | None = candidate.among
             if plays:
-                among = {
-                    index: tuple((np.flatnonzero(may[mine]) + 1).tolist()) for index, may in plays.items()
-                }
+                among = {index: tuple((np.flatnonzero(may[mine]) + 1).tolist()) for index, may in plays.items()}
             own = [int(block.ego(np.array([at]))[0]), *members[mine].tolist()]
             yield at, candidate, own, among, bool(sure[place])
 
