@@ -12,7 +12,7 @@ from scenicq.compiler.items import items_of
 from scenicq.compiler.known_properties import known_truth
 from scenicq.compiler.logic import condition
 from scenicq.compiler.other_objects import gathered
-from scenicq.compiler.values import Gathered, Instance, LabelObjects, ModelValue, describe, fail
+from scenicq.compiler.values import Instance, LabelObjects, ModelValue, OtherList, describe, fail
 from scenicq.errors import Span
 from scenicq.forest.nodes import Node
 from scenicq.syntax import ast
@@ -86,7 +86,7 @@ def go_through(
     _nest(run, clauses, scope, Environment({}, scope, comprehension=True), visit, first)
 
 
-def through_others(run: Interpreter, node: ast.Comprehension, objects: LabelObjects, scope: Environment) -> Gathered:
+def through_others(run: Interpreter, node: ast.Comprehension, objects: LabelObjects, scope: Environment) -> OtherList:
     """A comprehension over label objects that play no role, which is evaluated for one that stands for each.
 
     Raises:

@@ -13,11 +13,11 @@ from scenicq.compiler.other_objects import is_element, is_nearest, same_object
 from scenicq.compiler.random_values import holds_instances, is_choice, lift, possible_values
 from scenicq.compiler.values import (
     Choice,
-    Gathered,
     Instance,
     LabelObjects,
     ModelValue,
     Nearest,
+    OtherList,
     describe,
     fail,
     is_node,
@@ -245,7 +245,7 @@ def iterate(value: ModelValue, span: Span) -> list[ModelValue]:
     if is_random(value):
         raise fail("random-branch", "a random list cannot be gone through", span, "random here",
                    ("use `Uniform(*list)` to pick one of its items",))  # fmt: skip
-    if isinstance(value, LabelObjects | Gathered):
+    if isinstance(value, LabelObjects | OtherList):
         hint = "ask with `any(... for c in others(C))`, `all(...)`, `len([...])`, or `count(C)`"
         what = "the other label objects cannot be gone through one by one"
         raise fail("unsupported-construct", what, span, "not a list", (hint,))

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, cast
 
 from scenicq.compiler import operators
 from scenicq.compiler.coerce import OBSERVABLE, property_node, to_boolean
-from scenicq.compiler.values import Gathered, Instance, LabelObjects, ModelValue, Nearest, ScenicClass, describe, fail
+from scenicq.compiler.values import Instance, LabelObjects, ModelValue, Nearest, OtherList, ScenicClass, describe, fail
 from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.forest.kinds import kind_of
@@ -71,7 +71,7 @@ def others(run: Interpreter, span: Span, *args: ModelValue, **named: ModelValue)
 
 def count(run: Interpreter, span: Span, *args: ModelValue, **named: ModelValue) -> ModelValue:
     """`count(C, within=R)`."""
-    if args and isinstance(args[0], Gathered) and len(args) == 1 and not named:
+    if args and isinstance(args[0], OtherList) and len(args) == 1 and not named:
         return how_many(args[0], span)
     cls = _class(run, span, "count", args, named, _FILTERS)
     every = _all_of(run, cls, span)
@@ -120,7 +120,7 @@ def is_nearest(one: Instance, other: Nearest, span: Span) -> Node:
 
 def gathered(
     objects: LabelObjects, span: Span, visit: Callable[[Instance], tuple[tuple[Node, ...], ModelValue]]
-) -> Gathered:
+) -> OtherList:
     """A list with something of each of some label objects.
 
     Args:
@@ -129,7 +129,7 @@ def gathered(
         visit: Gives conditions on what stands for each, and what the list has of it.
     """
     element = _element(objects, span)
-    return Gathered(objects, element, *visit(element))
+    return OtherList(objects, element, *visit(element))
 
 
 def is_element(value: ModelValue) -> bool:
@@ -144,7 +144,7 @@ def same_object(one: Instance, other: Instance, span: Span) -> ModelValue:
     return _compare("==", _who(one, IDENTITY, span), _who(other, IDENTITY, span), span)
 
 
-def gathered_truth(op: str, gathered: Gathered, span: Span) -> Node:
+def gathered_truth(op: str, gathered: OtherList, span: Span) -> Node:
     """`any` ("or") or `all` ("and") of a list."""
     wanted = to_boolean(gathered.value, span)
     if op == "or":
@@ -156,7 +156,7 @@ def gathered_truth(op: str, gathered: Gathered, span: Span) -> Node:
     return _among(AmongOp.EVERY, gathered.objects, gathered.element, wanted, span)
 
 
-def how_many(gathered: Gathered | LabelObjects, span: Span) -> Node:
+def how_many(gathered: OtherList | LabelObjects, span: Span) -> Node:
     """`len` of a list, or of all others."""
     if isinstance(gathered, LabelObjects):
         return _among(AmongOp.COUNT, gathered, _element(gathered, span), build.constant(True), span)

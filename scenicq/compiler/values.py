@@ -19,12 +19,12 @@ __all__ = [
     "Choice",
     "Delayed",
     "Function",
-    "Gathered",
     "Instance",
     "LabelObjects",
     "ModelValue",
     "Module",
     "Nearest",
+    "OtherList",
     "PropertyDefinition",
     "ScenicClass",
     "describe",
@@ -159,7 +159,7 @@ class LabelObjects:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Gathered:
+class OtherList:
     """A list with something of each of some label objects.
 
     Attributes:
@@ -291,7 +291,7 @@ _NAMES: dict[type, str] = {
     Module: "a module",
     Choice: "a random choice",
     LabelObjects: "the other label objects of a class",
-    Gathered: "a list of other label objects",
+    OtherList: "a list of other label objects",
     Delayed: "a value that depends on an object's position",
 }
 

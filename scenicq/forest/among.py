@@ -22,14 +22,14 @@ from scenicq.forest.nodes import ELEMENT, RANK, Among, AmongOp, Body, Feature, L
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.walk import postorder
 
-__all__ = ["LABEL_OBJECTS", "Elements", "among_column", "asked_of_others", "asks_others"]
+__all__ = ["LABEL_OBJECTS", "LabelElements", "among_column", "asked_of_others", "asks_others", "joined", "taken"]
 
 _NO, _MAYBE, _YES = np.int8(0), np.int8(1), np.int8(2)
 Truths = NDArray[np.int8]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Elements:
+class LabelElements:
     """The label objects at some places, a row each.
 
     Attributes:
@@ -57,7 +57,7 @@ def asks_others(*roots: Node) -> bool:
 
 
 def asked_of_others(scenario: Scenario) -> frozenset[str] | None:
-    """The properties that a scenario asks of label objects that may play no role; None where it asks nothing of them."""
+    """The properties that a scenario asks of label objects that may play no role; None where it asks none."""
     todo = [each.condition for each in scenario.requirements]
     todo += scenario.dynamics.conditions if scenario.dynamics is not None else ()
     if not asks_others(*todo):
@@ -73,7 +73,7 @@ def asked_of_others(scenario: Scenario) -> frozenset[str] | None:
     return frozenset(found)
 
 
-def among_column(node: Among, inputs: Sequence[Column], elements: Elements) -> Column:
+def among_column(node: Among, inputs: Sequence[Column], elements: LabelElements) -> Column:
     """The value of a node at each place.
 
     Args:
@@ -114,7 +114,7 @@ def among_column(node: Among, inputs: Sequence[Column], elements: Elements) -> C
     return Column(surely >= node.number, np.maximum(unknown, np.where(open_, UNKNOWN, DEFINED)))
 
 
-def _of_rows(elements: Elements, place: NDArray[np.intp], n: int) -> Elements:
+def _of_rows(elements: LabelElements, place: NDArray[np.intp], n: int) -> LabelElements:
     """The label objects of the place of each row, where each row is a place."""
     sizes = np.bincount(elements.place, minlength=n)
     firsts = np.cumsum(sizes) - sizes
@@ -125,9 +125,9 @@ def _of_rows(elements: Elements, place: NDArray[np.intp], n: int) -> Elements:
     def observed(name: str) -> Column:
         found = elements.observed(name)
         whole = len(elements.place)
-        return Column(_taken(found.data, which, whole), np.broadcast_to(found.status, whole)[which])
+        return Column(taken(found.data, which, whole), np.broadcast_to(found.status, whole)[which])
 
-    return Elements(
+    return LabelElements(
         np.repeat(np.arange(len(place)), mine), elements.known[place], elements.ids[which],
         lambda category: elements.belongs(category)[which], observed,
     )  # fmt: skip
@@ -135,7 +135,7 @@ def _of_rows(elements: Elements, place: NDArray[np.intp], n: int) -> Elements:
 
 def _nearest(
     body: Body, found: dict[int, Column], holds: Truths, place: NDArray[np.intp],
-    about: tuple[NDArray[np.intp], Elements, NDArray[np.int8]],
+    about: tuple[NDArray[np.intp], LabelElements, NDArray[np.int8]],
 ) -> Column:  # fmt: skip
     """The value of the nearest row that holds at each place; unknown where a row that may hold comes before."""
     rows, elements, unknown = about
@@ -155,7 +155,7 @@ def _nearest(
     own = np.broadcast_to(value.status, len(rows))
     if not len(rows):
         return Column(np.full(1, np.nan), np.maximum(status, unknown))
-    return Column(_taken(value.data, picked, len(rows)), np.maximum(np.maximum(status, unknown), np.where(
+    return Column(taken(value.data, picked, len(rows)), np.maximum(np.maximum(status, unknown), np.where(
         status == DEFINED, own[picked], DEFINED)))  # fmt: skip
 
 
@@ -172,18 +172,37 @@ def _truths(found: Column, n: int) -> Truths:
 
 def _read(
     feature: Feature, rows: NDArray[np.intp], place: NDArray[np.intp], n: int, given: Sequence[Column],
-    elements: Elements,
+    elements: LabelElements,
 ) -> Column:  # fmt: skip
     """What a feature of a body is in each row."""
     if feature.object == ELEMENT:
         found = elements.observed(feature.property)
-        return Column(_taken(found.data, rows, len(elements.place)), np.broadcast_to(
+        return Column(taken(found.data, rows, len(elements.place)), np.broadcast_to(
             found.status, len(elements.place))[rows])  # fmt: skip
     found = given[int(feature.property)]
-    return Column(_taken(found.data, place, n), np.broadcast_to(found.status, n)[place])
+    return Column(taken(found.data, place, n), np.broadcast_to(found.status, n)[place])
 
 
-def _taken(data: Data, rows: NDArray[np.intp], n: int) -> Data:
+def joined(columns: Sequence[Column]) -> Column:
+    """Columns of places one after the other, of one kind."""
+    lengths = [len(each.status) for each in columns]
+    status = np.concatenate([each.status for each in columns])
+
+    def whole(parts: Sequence[Array]) -> Array:
+        return np.concatenate([np.broadcast_to(part, n) for part, n in zip(parts, lengths, strict=True)])
+
+    first = columns[0].data
+    if isinstance(first, tuple):
+        pairs = [each.data for each in columns if isinstance(each.data, tuple)]
+        if len(pairs) == len(columns):
+            return Column((whole([x for x, _ in pairs]), whole([y for _, y in pairs])), status)
+    numbers = [each.data for each in columns if isinstance(each.data, np.ndarray)]
+    if len(numbers) == len(columns):
+        return Column(whole(numbers), status)
+    raise CannotEvaluate("what is asked of the nearest is of several kinds")
+
+
+def taken(data: Data, rows: NDArray[np.intp], n: int) -> Data:
     """Values at some rows of n."""
 
     def take(values: Array) -> Array:

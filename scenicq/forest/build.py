@@ -105,22 +105,25 @@ def _count_against(many: Among, op: CompareOp, number: float, span: Span | None)
             return constant(True, span)
         return replace(many, op=AmongOp.AT_LEAST, kind="boolean", number=least, span=span)
 
+    def negation(node: Node) -> Node:
+        return logic(LogicOp.NOT, node, span=span)
+
     match op:
         case CompareOp.GE:
             return at_least(math.ceil(number))
         case CompareOp.GT:
             return at_least(math.floor(number) + 1)
         case CompareOp.LT:
-            return opposite(at_least(math.ceil(number)))
+            return negation(at_least(math.ceil(number)))
         case CompareOp.LE:
-            return opposite(at_least(math.floor(number) + 1))
+            return negation(at_least(math.floor(number) + 1))
         case _ if number != math.floor(number):
             return constant(op is CompareOp.NE, span)
         case _:
-            more = opposite(at_least(int(number) + 1))
+            more = negation(at_least(int(number) + 1))
             least = at_least(int(number))
             same = more if isinstance(least, Constant) else logic(LogicOp.AND, least, more, span=span)
-            return same if op is CompareOp.EQ else opposite(same)
+            return same if op is CompareOp.EQ else negation(same)
 
 
 def logic(op: LogicOp, *args: Node, span: Span | None = None) -> Node:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import cast
 
-from scenicq.forest.among import LABEL_OBJECTS, Elements, among_column
+from scenicq.forest.among import LABEL_OBJECTS, LabelElements, among_column
 from scenicq.forest.columns import UNDEFINED, UNKNOWN, constant_column, value_reader
 from scenicq.forest.compute import compute, directions
 from scenicq.forest.evaluate import Observation
@@ -114,7 +114,7 @@ def _fold(node: Node) -> Node:
 def _fold_among(node: Among, observed: Observation) -> Node:
     """What is known of label objects; where that is not known, the node with what is."""
     elements = cast(object, observed.get(LABEL_OBJECTS)) or node.elements
-    if not isinstance(elements, Elements):
+    if not isinstance(elements, LabelElements):
         return node
     if not all(isinstance(child, Constant) for child in node.inputs):
         return node if node.elements is elements else replace(node, elements=elements)

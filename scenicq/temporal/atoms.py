@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.budget import look
-from scenicq.forest.among import Elements, among_column
+from scenicq.forest.among import LabelElements, among_column, joined, taken
 from scenicq.forest.clear_columns import QuickColumns, quick_form
 from scenicq.forest.column_domain import ColumnDomain, first_direction
 from scenicq.forest.columns import DEFINED, UNDEFINED, Coded, Column, arrays_of, column_of, constant_column, truth_of
@@ -89,7 +89,9 @@ class AtomColumns:
     undecided: list[NDArray[np.bool_]] = field(default_factory=list["NDArray[np.bool_]"])
     _features: dict[tuple[int, str], Column | None] = field(default_factory=dict["tuple[int, str]", "Column | None"])
     _looked_up: dict[int, _LookedUp] = field(default_factory=dict["int", "_LookedUp"])
-    _elements: list[Elements] = field(default_factory=list["Elements"])
+    _elements: list[tuple[int, int, LabelElements | None]] = field(
+        default_factory=list["tuple[int, int, LabelElements | None]"]
+    )
     _readings: dict[int, tuple[Node, NDArray[np.int64]]] = field(default_factory=dict["int", "tuple[Node, Any]"])
 
     def assigned(self, assignment: Mapping[Identity, Value]) -> AtomColumns:
@@ -325,12 +327,19 @@ class AtomColumns:
 
     def _others(self, node: Among, inputs: Sequence[Column]) -> Column:
         """What holds of the label objects of each sample; unknown where the samples are of one binding alone."""
-        if not isinstance(self.samples, BoundSamples):
+        samples = self.samples
+        if not isinstance(samples, BoundSamples) or not len(samples):
             return Column(np.full(1, np.nan), np.full(1, UNOBSERVED))
         if not self._elements:
-            self._elements.append(self.samples.elements())
-        look()
-        return among_column(node, inputs, self._elements[0])
+            self._elements += samples.pieces()
+        found: list[Column] = []
+        for first, end, elements in self._elements:
+            look()
+            # those of many samples are not kept
+            there = elements or samples.at(np.arange(first, end)).elements()
+            mine = [each if _is_one(each) else _piece(each, first, end, len(samples)) for each in inputs]
+            found.append(among_column(node, mine, there))
+        return found[0] if len(found) == 1 else joined(found)
 
     def _observed_at(self, node: Feature, samples: NDArray[np.int64]) -> Column:
         """What is observed of a feature at some samples."""
@@ -362,6 +371,17 @@ class AtomColumns:
                 status = np.where(np.isnan(seen[0]), UNOBSERVED, DEFINED)
                 self._features[key] = Column((seen[0], seen[1]) if len(seen) == 2 else seen[0], status)
         return self._features[key]
+
+
+def _is_one(column: Column) -> bool:
+    """Whether a column has one value for all places."""
+    return all(part.size == 1 for part in (*arrays_of(column.data), column.status))
+
+
+def _piece(column: Column, first: int, end: int, n: int) -> Column:
+    """A column of n places at some of them."""
+    rows = np.arange(first, end)
+    return Column(taken(column.data, rows, n), np.broadcast_to(column.status, n)[rows])
 
 
 def _as_truth(found: Column, count: int) -> Truth:

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
+from itertools import pairwise
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scenicq.forest.among import Elements
+from scenicq.forest.among import LabelElements
 from scenicq.forest.columns import DEFINED, UNKNOWN, Column, column_of
 from scenicq.forest.ego_frame import PLACE
 from scenicq.forest.nodes import IDENTITY, RANK, TRACK, Value
@@ -27,6 +28,8 @@ MOVING = _WHO | {"position", "heading", "velocity", "speed", "angularSpeed", "ac
 FIXED = frozenset({"width", "length", "height"})
 """Properties that are the same at each sample."""
 
+_AT_ONCE = 200_000
+"""Label objects in memory of whom something is asked."""
 _COLUMNS = {
     "heading": "heading", "width": "width", "length": "length", "height": "height",
     "angularSpeed": "yaw_rate", "acceleration": "acceleration",
@@ -112,15 +115,28 @@ class BoundSamples:
         labels = None if self.labels is None else self.labels[chosen]
         return BoundSamples(self.block, members, size, labels, self.classes)
 
-    def elements(self) -> Elements:
+    def elements(self) -> LabelElements:
         """All label objects of the label of each place, whether or not they play a role."""
-        labels = self.labels
-        if labels is None:
-            labels = np.max([np.where(mine >= 0, self.block.label_of[mine], -1) for mine in self.members.values()], 0)
-        return label_elements(self.block, labels, self.classes)
+        return label_elements(self.block, self._labels(), self.classes)
+
+    def pieces(self) -> list[tuple[int, int, LabelElements | None]]:
+        """From where to where places have not too many label objects, and these, where all are one piece."""
+        counts = np.cumsum(np.append(np.diff(self.block.object_starts), 0)[self._labels()] + 1)
+        cuts = [0]
+        while cuts[-1] < self.size:
+            before = int(counts[cuts[-1] - 1]) if cuts[-1] else 0
+            cuts.append(max(cuts[-1] + 1, int(np.searchsorted(counts, before + _AT_ONCE, side="right"))))
+        if len(cuts) == 2:
+            return [(0, self.size, self.elements())]
+        return [(first, end, None) for first, end in pairwise(cuts)]
+
+    def _labels(self) -> NDArray[np.int64]:
+        if self.labels is not None:
+            return self.labels
+        return np.max([np.where(mine >= 0, self.block.label_of[mine], -1) for mine in self.members.values()], 0)
 
 
-def label_elements(block: TrackBlock, labels: NDArray[np.int64], classes: Granularity) -> Elements:
+def label_elements(block: TrackBlock, labels: NDArray[np.int64], classes: Granularity) -> LabelElements:
     """The label objects of some labels, place by place, the egos that are there among them.
 
     Args:
@@ -158,7 +174,7 @@ def label_elements(block: TrackBlock, labels: NDArray[np.int64], classes: Granul
         return Column((found[0], found[1]) if len(found) == 2 else found[0], status)
 
     ids = block.tracks(members).astype(np.float64)
-    return Elements(place.astype(np.intp), labels >= 0, ids, belongs, observed)
+    return LabelElements(place.astype(np.intp), labels >= 0, ids, belongs, observed)
 
 
 @dataclass(eq=False, slots=True)

@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
-from scenicq.forest.among import Elements
+from scenicq.forest.among import LabelElements
 from scenicq.forest.nodes import Value
 from scenicq.forest.scenario import Scenario
 from scenicq.limits import LIMITS, exhausted
@@ -77,7 +77,7 @@ class LabelProblem:
     ranks: Mapping[int, int]
     disc: tuple[tuple[float, float], float] | None
     classes: Granularity = "fine"
-    elements: Elements | None = None
+    elements: LabelElements | None = None
 
     def signatures(
         self, relevant: tuple[frozenset[str], ...]

@@ -9,7 +9,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from scenicq.forest.among import LABEL_OBJECTS, Elements
+from scenicq.forest.among import LABEL_OBJECTS, LabelElements
 from scenicq.forest.columns import Column, column_of
 from scenicq.forest.nodes import IDENTITY, RANK, TRACK, Value
 from scenicq.match.problem.candidates import LabelProblem
@@ -38,7 +38,7 @@ def who_plays(problem: LabelProblem, assignment: Mapping[int, int]) -> dict[tupl
     return found
 
 
-def _elements(problem: LabelProblem) -> Elements:
+def _elements(problem: LabelProblem) -> LabelElements:
     label = problem.label
     first = 0 if label.has_ego else 1
     numbers = range(first, len(problem.seen))
@@ -56,6 +56,6 @@ def _elements(problem: LabelProblem) -> Elements:
             return Column(ranks if name == RANK else np.array(numbers, np.float64), np.zeros(len(objects), np.int8))
         return column_of([problem.seen[number].get(name) for number in numbers])
 
-    return Elements(
+    return LabelElements(
         np.zeros(len(objects), np.intp), np.ones(1, np.bool_), np.array(numbers, np.float64), belongs, observed
     )
