@@ -68,6 +68,7 @@ class GroupCache:
     lookups: MapLookups
     trials: Trials = field(default_factory=lambda: Trials(LIMITS.witness_trials))
     patience: Patience = Patience.ALL
+    _last: tuple[tuple[Group, tuple[int, ...]], list[Item]] | None = None
     _nodes: LabelNodes = field(default_factory=LabelNodes)
     _cases: KnownCases = field(default_factory=dict["tuple[object, ...]", "DirectedCases"])
     _known: dict[tuple[int, tuple[int, ...]], tuple[Group, Search]] = field(
@@ -90,26 +91,34 @@ class GroupCache:
         Raises:
             CannotEvaluate: Geometry cannot tell the value of an expression.
         """
+        items = self._conditioned(group, assignment)
+        if _asks_others(group):
+            items = [(item, certain_and_possible(node, _is_among)[not surely], seen) for item, node, seen in items]
+        return items if self.problem.disc is None else within_radius(items, *self.problem.disc)
+
+    def has_doubts(self, group: Group, assignment: Mapping[int, int]) -> bool:
+        """Whether a group asks of label objects without a role what is not known."""
+        return _asks_others(group) and asks_others(*(node for _, node, _ in self._conditioned(group, assignment)))
+
+    def _conditioned(self, group: Group, assignment: Mapping[int, int]) -> list[Item]:
+        """The constraints with what is observed put in."""
+        asks = _asks_others(group)
+        key = group, tuple([assignment[index] for index in group.objects])
+        if asks and self._last is not None and self._last[0] == key:
+            return self._last[1]
         observed: dict[tuple[int, str], Value] = {
             (index, name): value
             for index in group.objects
             for name, value in self.problem.seen[assignment[index]].items()
         }
         observed.update({(PARAMS, name): value for name, value in self.problem.params.items()})
-        asks = _asks_others(group)
-        if asks:
-            observed.update(who_plays(self.problem, assignment))
+        if not asks:
+            return self._nodes.items(group, observed, assignment)
+        observed.update(who_plays(self.problem, assignment))
         items = self._nodes.items(group, observed, assignment)
-        if asks:
-            items = [(item, certain_and_possible(node, _is_among)[not surely], seen) for item, node, seen in items]
-        return items if self.problem.disc is None else within_radius(items, *self.problem.disc)
-
-    def has_doubts(self, group: Group, assignment: Mapping[int, int]) -> bool:
-        """Whether a group asks of label objects without a role what is not known."""
-        if not _asks_others(group):
-            return False
-        some, sure = (self.items(group, assignment, surely=surely) for surely in (False, True))
-        return any(one[1] is not other[1] for one, other in zip(some, sure, strict=True))
+        # those are asked for twice
+        self._last = key, items
+        return items
 
     def of(self, plan: GroupPlan, assignment: Mapping[int, int]) -> tuple[Group, Outcome]:
         """What is decided for the label objects in a group's roles, said of a group of its shape (see `translated`)."""

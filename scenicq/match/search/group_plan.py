@@ -49,7 +49,7 @@ class MatchPlan:
         groups: All of them, in dependency order.
         ego_only: Those about the ego and parameters alone.
         unary: Those about one object and the ego, by that object.
-        joint: Those about several objects.
+        joint: Those about several objects, and those that ask of label objects without a role.
         twins: For an object, an earlier one that is interchangeable with it.
         links: For an object, those that it shares a group with.
         signature: What is observed.
@@ -96,14 +96,16 @@ def make_plan(scenario: Scenario, signature: Signature, options: MatchOptions, k
             for index in roles:
                 links.setdefault(index, set()).update(roles)
     unary: dict[int, list[GroupPlan]] = {}
+    # what is asked of all label objects comes last, and only of those that are tried
+    late = {each for each in groups if each.roles and asks_others(*_expressions(each.group))}
     for each in groups:
-        if len(each.roles) == 1:
+        if len(each.roles) == 1 and each not in late:
             unary.setdefault(each.roles[0], []).append(each)
     return MatchPlan(
         tuple(groups),
         tuple(each for each in groups if not each.roles),
         {index: tuple(found) for index, found in unary.items()},
-        tuple(each for each in groups if len(each.roles) > 1),
+        tuple(each for each in groups if len(each.roles) > 1 or each in late),
         interchangeable(scenario, built, shapes, options.tolerance),
         {index: frozenset(others - {index}) for index, others in links.items()},
         signature,
