@@ -37,8 +37,10 @@ from scenicq.query.prefilter.sql_ends import SQL, SqlTruth
 from scenicq.store.classes import ROOT, Granularity, class_truth, subclasses
 from scenicq.store.sql import sql_text
 
-__all__ = ["OTHER", "OtherCondition", "other_conditions"]
+__all__ = ["OBJECTS", "OTHER", "OtherCondition", "other_conditions", "proof"]
 
+OBJECTS = "block_objects"
+"""The view of the label objects of a block, with their `number` in the file."""
 OTHER = "o"
 """Alias of a row of a label object."""
 
@@ -61,7 +63,7 @@ class OtherCondition:
 
 
 def other_conditions(scenario: Scenario, classes: Granularity) -> Iterator[OtherCondition]:
-    """The conditions of a scenario, whose ego is that of the label.
+    """The conditions that a frame misses only where it does not match; the ego is that of the label.
 
     Args:
         scenario: The scenario.
@@ -69,21 +71,35 @@ def other_conditions(scenario: Scenario, classes: Granularity) -> Iterator[Other
     """
     for requirement in scenario.requirements:
         for part in conjuncts(requirement.condition):
-            negated = isinstance(part, Logic) and part.op is LogicOp.NOT
-            node = part.args[0] if isinstance(part, Logic) and negated else part
-            if isinstance(node, Among) and (found := _read(node, scenario.ego, classes, negated=negated)) is not None:
-                counted, at_least, most = found
-                yield OtherCondition(counted, at_least, most, requirement.span)
+            found = _read(part, scenario.ego, classes, proving=False)
+            if found is not None:
+                yield OtherCondition(*found, requirement.span)
 
 
-def _read(
-    node: Among, ego: int, classes: Granularity, *, negated: bool
-) -> tuple[str, int | None, int] | None:  # fmt: skip
+def proof(part: Node, ego: int, classes: Granularity) -> str | None:
+    """SQL over a frame `ego` that proves a condition on label objects; None where SQL cannot tell.
+
+    Args:
+        part: The condition.
+        ego: The index of the ego, which is that of the label.
+        classes: How classes are compared.
+    """
+    found = _read(part, ego, classes, proving=True)
+    if found is None:
+        return None
+    counted, at_least, most = found
+    few = f"<= {most}" if at_least is None else f">= {at_least}"
+    return f"(SELECT count(*) FROM {OBJECTS} {OTHER} WHERE {OTHER}.frame = {EGO}.frame AND {counted}) {few}"
+
+
+def _read(part: Node, ego: int, classes: Granularity, *, proving: bool) -> tuple[str, int | None, int] | None:
     """What counts and how many must, or may; None where SQL cannot tell."""
-    every = node.op is AmongOp.EVERY
-    given = node.inputs[node.excluded :]
-    about = {index for index, _ in features(*given)}
-    if node.op not in (AmongOp.AT_LEAST, AmongOp.EVERY) or about - {ego} or (every and negated):
+    negated = isinstance(part, Logic) and part.op is LogicOp.NOT
+    node = part.args[0] if isinstance(part, Logic) and negated else part
+    if not isinstance(node, Among) or node.op not in (AmongOp.AT_LEAST, AmongOp.EVERY):
+        return None
+    every, given = node.op is AmongOp.EVERY, node.inputs[node.excluded :]
+    if {index for index, _ in features(*given)} - {ego} or (every and negated):
         return None
     columns = {(ELEMENT, name): column for name, column in object_columns(OTHER).items()}
     columns |= {(ego, name): column for name, column in object_columns(EGO, "ego_").items()}
@@ -100,13 +116,20 @@ def _read(
                 return each
 
     body = in_ego_frame(transform(node.body.condition, put_in), ego)
+    # of those who are all that is known is that some may play a role
     roles = node.excluded - 1
-    if not negated and not every:
-        return _and(_of_class(node.category, classes, 1), bounds.can_hold(body), unknown=True), node.number, 0
-    # what surely counts must be few
-    surely = bounds.can_hold(body) if every else bounds.can_fail(body)
-    counted = _and(_of_class(node.category, classes, 2), SQL.negation(surely), unknown=False)
-    return counted, None, (1 if every else node.number) - 1 + roles
+    few = negated or every
+    if few == proving:
+        # those that may count
+        may = bounds.can_fail(body) if every else bounds.can_hold(body)
+        counted = _and(_of_class(node.category, classes, 1), may, unknown=True)
+    else:
+        surely = bounds.can_hold(body) if every else bounds.can_fail(body)
+        counted = _and(_of_class(node.category, classes, 2), SQL.negation(surely), unknown=False)
+    least = 1 if every else node.number
+    if few:
+        return counted, None, least - 1 + (0 if proving else roles)
+    return counted, least + (roles if proving else 0), 0
 
 
 def _of_class(category: str, classes: Granularity, least: int) -> str:

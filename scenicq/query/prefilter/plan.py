@@ -21,7 +21,7 @@ from scenicq.query.prefilter.condition_reader import EGO, ColumnCondition
 from scenicq.query.prefilter.conditions import necessary_conditions, sufficient_conditions
 from scenicq.query.prefilter.decision import decision, new_table
 from scenicq.query.prefilter.map_relations import MapRelations
-from scenicq.query.prefilter.other_objects import OTHER, OtherCondition, other_conditions
+from scenicq.query.prefilter.other_objects import OBJECTS, OTHER, OtherCondition, other_conditions
 from scenicq.query.prefilter.params import param_conditions
 from scenicq.query.prefilter.plan_draft import Draft, Stage, Step, blamed_step
 from scenicq.query.prefilter.regions import RegionNames
@@ -31,7 +31,7 @@ from scenicq.store.sql import sql_text
 
 __all__ = ["LABELS", "MEMBERSHIPS", "OBJECTS", "PASSED", "SENSORS", "Plan", "make_plan"]
 
-LABELS, OBJECTS, MEMBERSHIPS = "block_labels", "block_objects", "block_memberships"
+LABELS, MEMBERSHIPS = "block_labels", "block_memberships"
 """The views that a plan reads: rows of a block of each table with their `number` in the file."""
 SENSORS = "block_sensors"
 """The view of the sensor files of a block."""
