@@ -355,7 +355,7 @@ SELECT frame FROM ego WHERE frame NOT IN (SELECT frame FROM objects a WHERE a.cl
     "three on foot": _driving(
         "from scenicq.labels import count\nrequire count(Pedestrian, within=CircularRegion(ego, 30)) >= 3",
         """
-SELECT a.frame FROM objects a JOIN ego USING (frame) WHERE a.class = 'Pedestrian' AND a.ego_distance <= 30
+SELECT a.frame FROM objects a JOIN ego USING (frame) WHERE a.class = 'Adult' AND a.ego_distance <= 30
 GROUP BY a.frame HAVING count(*) >= 3""",
     ),
     "two in one intersection": _driving(
