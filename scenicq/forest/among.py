@@ -84,7 +84,7 @@ def among_column(node: Among, inputs: Sequence[Column], elements: LabelElements)
     counts = elements.belongs(node.category).copy()
     place, n = elements.place, len(elements.known)
     for each in inputs[: node.excluded]:
-        who, status = (np.broadcast_to(part, n)[place] for part in (each.data, each.status))
+        who, status = np.broadcast_to(np.asarray(each.data), n)[place], np.broadcast_to(each.status, n)[place]
         counts[(who == elements.ids) & (status == DEFINED)] = _NO
         counts[status != DEFINED] = np.minimum(counts[status != DEFINED], _MAYBE)
     rows = np.flatnonzero(counts)

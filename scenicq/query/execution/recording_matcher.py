@@ -295,18 +295,18 @@ class RecordingMatcher:
         sure: NDArray[np.bool_], read: Iterator[Candidate],
     ) -> Iterator[tuple[int, Candidate, list[int], Mapping[int, tuple[int, ...]] | None, bool]]:  # fmt: skip
         """Labels for the matcher, with their members, who may play whom, and whether plain requirements hold."""
-        whole = candidates is None or self._whole
-        members = _objects_of(block, labels) if whole else candidates.members
+        members = _objects_of(block, labels) if candidates is None or self._whole else candidates.members
         plays: dict[int, NDArray[np.bool_]] = {}
-        for index, may in () if candidates is None else candidates.may.items():
-            every = np.zeros(block.object_count, np.bool_)
-            every[candidates.members] = may
-            plays[index] = every[members]
+        if candidates is not None:
+            for index, may in candidates.may.items():
+                every = np.zeros(block.object_count, np.bool_)
+                every[candidates.members] = may
+                plays[index] = every[members]
         ends = np.searchsorted(block.label_of[members], np.append(labels, len(block))).tolist()
         for place, (at, candidate) in enumerate(zip(labels.tolist(), read, strict=True)):
             mine = slice(ends[place], ends[place + 1])
             among: Mapping[int, tuple[int, ...]] | None = candidate.among
-            if plays:
+            if candidates is not None:
                 among = {index: tuple((np.flatnonzero(may[mine]) + 1).tolist()) for index, may in plays.items()}
             own = [int(block.ego(np.array([at]))[0]), *members[mine].tolist()]
             yield at, candidate, own, among, bool(sure[place])
@@ -325,7 +325,9 @@ class RecordingMatcher:
             key=lambda n: (intervals[n].recording, intervals[n].start, intervals[n].end, told[n].place),
         )
         intervals, told = [intervals[n] for n in order], [told[n] for n in order]
-        witnesses = self._witnesses(rows, intervals, told, starts) if self.proofs else {}
+        witnesses: Mapping[int, Mapping[str, WitnessValue]] = {}
+        if self.proofs:
+            witnesses = self._witnesses(rows, intervals, told, starts)
         open_ended = scenario.dynamics is None or not scenario.dynamics.terminates
         recordings = np.array([each.recording for each in intervals], dtype=np.int64)
         firsts = np.array([first for first, _ in block.runs], dtype=np.int64)[recordings]

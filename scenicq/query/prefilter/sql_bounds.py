@@ -156,7 +156,7 @@ class _Alternatives:
     def feature(self, node: Feature) -> Alternatives:
         return self._few([self.domain.feature(node)])
 
-    def among(self, node: Among, _args: Sequence[Alternatives]) -> Alternatives:
+    def among(self, node: Among, args: Sequence[Alternatives]) -> Alternatives:
         return self._few([self.domain.among(node, ())], None)
 
     def variable(self, node: Leaf, args: Sequence[Alternatives]) -> Alternatives:
