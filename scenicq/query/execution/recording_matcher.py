@@ -336,8 +336,9 @@ class RecordingMatcher:
         names = {each: block.name(each) for each in cast("list[int]", np.unique(recordings).tolist())}
         objects = [owner.name for owner in scenario.objects]
         start_us, end_us = (cast("list[int]", block.times_us[labels].tolist()) for labels in (first, last))
-        found = zip(intervals, told, block.frames(first), block.frames(last), start_us, end_us, strict=True)
-        for each, who, frame, last_frame, begins_us, ends_us in found:
+        pairs = zip(intervals, told, strict=True)
+        found = zip(pairs, block.frames(first), block.frames(last), start_us, end_us, strict=True)
+        for (each, who), frame, last_frame, begins_us, ends_us in found:
             roles = {objects[index]: _named(track) for index, track in sorted(who.tracks.items())}
             verdict: Verdict
             if each.truth == TRUE:
