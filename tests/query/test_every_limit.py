@@ -153,6 +153,7 @@ REACHED: dict[str, str] = {
 UNREACHED = {
     "dreal_conjunctions": "dReal is installed nowhere (`tests/smt/test_contract.py` where it is)",
     "solver_memory_mb": "told to a process when it starts (`tests/smt/test_smtlib.py`)",
+    "nearer_steps": "of searches beyond `ordered_steps` (`tests/oracle/test_nearest_first.py`)",
     "advice_maps": "of datasets with several maps",
     "brief_maps": "of datasets with several maps",
     "block_tries": "of processes that die (`tests/query/execution/test_block_executor.py`)",
