@@ -10,6 +10,8 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import TYPE_CHECKING
 
+from scenicq.compiler.random_values import is_choice
+from scenicq.compiler.road_courses import along, beside, corridor, course
 from scenicq.compiler.values import Builtin, ModelValue
 
 if TYPE_CHECKING:
@@ -20,7 +22,12 @@ __all__ = ["LABELS", "QUESTIONS", "question_names"]
 LABELS = "scenicq.labels"
 """What programs call the module."""
 
-QUESTIONS: Mapping[str, Callable[..., ModelValue]] = {}
+QUESTIONS: Mapping[str, Callable[..., ModelValue]] = {
+    "along": along,
+    "beside": beside,
+    "corridor": corridor,
+    "course": course,
+}
 """What each name of the module does: a function of the interpreter, the place of the call, and what it is given."""
 
 
@@ -30,4 +37,4 @@ def question_names(run: Interpreter) -> dict[str, ModelValue]:
     Args:
         run: The interpreter of the program that imports it.
     """
-    return {name: Builtin(name, partial(meaning, run)) for name, meaning in QUESTIONS.items()}
+    return {name: Builtin(name, partial(meaning, run), spread=is_choice) for name, meaning in QUESTIONS.items()}

@@ -29,6 +29,7 @@ from scenicq.errors import Diagnostic, ScenarioError, Source, Span
 from scenicq.forest.compute import fold
 from scenicq.forest.nodes import Constant, Encloses, Intersects, Node, Undefined
 from scenicq.forest.scenario import BuiltIn, Property, Requirement, Scenario, ScenarioObject
+from scenicq.geometry.driven_courses import GAP_S
 from scenicq.geometry.elements import NetworkElement
 from scenicq.geometry.network import Network
 from scenicq.geometry.regions import Everywhere
@@ -50,6 +51,7 @@ def compile_scenario(
     loader: Loader | None = None,
     model: str | None = None,
     map_defaults: bool = True,
+    gap_s: float = GAP_S,
 ) -> Scenario:
     """Compile a program against a map.
 
@@ -64,6 +66,7 @@ def compile_scenario(
         model: The world model of a program that imports none, as Scenic's `--model`.
         map_defaults: Whether the world model's classes place and turn their objects as the map has it, where nothing
             else does. Without a map they never do, and the scenario's warnings say so.
+        gap_s: Seconds without a label at which the course of a track is cut.
 
     Raises:
         ScenarioError: The program is wrong or uses what is not supported.
@@ -73,7 +76,7 @@ def compile_scenario(
             timed = None if initial or behaviors is None else TimedStatements(behaviors)
             return _compiled(
                 source, network, version, initial=initial, timed=timed, loader=loader, model=model,
-                map_defaults=map_defaults,
+                map_defaults=map_defaults, gap_s=gap_s,
             )  # fmt: skip
     except Exhausted:
         what = f"evaluating the program takes more than {LIMITS.program_seconds:g} s"
@@ -91,12 +94,13 @@ def _compiled(
     loader: Loader | None,
     model: str | None,
     map_defaults: bool,
+    gap_s: float,
 ) -> Scenario:
     module = parse(source, version)
     chosen = decide_version(module)
     world = Modules(network, chosen, initial, loader, map_defaults=map_defaults and bool(network.features))
     run = world.interpreter
-    run.timed = timed
+    run.timed, run.gap_s = timed, gap_s
     try:
         library = None if world.is_model_named(module) else model or _left_out(module, chosen)
         names = {} if library is None else dict(world.load(library, _start(source)).names)

@@ -19,6 +19,8 @@ from scenicq.forest.interval_values import FloatOrArray, Interval, IntervalValue
 from scenicq.forest.nodes import (
     ArithmeticOp,
     CompareOp,
+    Corridor,
+    CourseCoordinate,
     DirectionAt,
     DiscAt,
     DiscreteRange,
@@ -26,6 +28,7 @@ from scenicq.forest.nodes import (
     Feature,
     Identity,
     Index,
+    LaneCourse,
     Leaf,
     LogicOp,
     PointIn,
@@ -234,6 +237,10 @@ class IntervalDomain(IntervalArithmetic[E]):
         match node:
             case DirectionAt():
                 return self.within(-math.pi, math.pi)
+            case CourseCoordinate():
+                return self.within(-math.inf, math.inf)
+            case LaneCourse():
+                return None
             case Distance():
                 region, point = map(self._pair, args)
                 return self._distance(region, point) if self.boxed else self.within(0.0, math.inf)
@@ -266,6 +273,8 @@ class IntervalDomain(IntervalArithmetic[E]):
                 return reduce(self._common, boxes)
             case RegionDifference():
                 return boxes[0]
+            case Corridor():
+                return self._pair(None)
             case DiscAt() | SectorAt():
                 reach = self.largest(self._scalar(args[1]))
             case RectangleAt():

@@ -16,9 +16,11 @@ from scenicq.forest.nodes import (
     CompareOp,
     Constant,
     Coordinate,
+    CourseCoordinate,
     DirectionAt,
     Feature,
     Intersects,
+    LaneCourse,
     Logic,
     LogicOp,
     Node,
@@ -86,6 +88,10 @@ class ValueNumbers:
                     below = sorted(below)
                 case Coordinate():
                     own = node.axis
+                case CourseCoordinate():
+                    own = node.axis, node.end
+                case LaneCourse():
+                    own = id(node.network), node.gap_s
                 case _ if is_leaf(node):
                     own = node.identity  # type: ignore[union-attr]
                 case _:

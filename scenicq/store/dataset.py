@@ -9,7 +9,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import closing, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,6 +26,7 @@ from scenicq.store.labels import Label
 from scenicq.store.manifest import Manifest, read_manifest
 from scenicq.store.place import LocalFolder, Place, StoreFile, find_place
 from scenicq.store.reader import read_labels
+from scenicq.store.recorded_tracks import RecordedTracks
 from scenicq.store.regions import read_features
 from scenicq.store.scans import allowed_paths, scan
 from scenicq.store.sql import sql_list
@@ -71,10 +72,16 @@ class Dataset:
     Attributes:
         place: Where its files are.
         manifest: What `dataset.json` says.
+        recorded: The tracks of its recordings.
     """
 
     place: Place
     manifest: Manifest
+    recorded: RecordedTracks = field(init=False, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Nothing of its tracks is read before it is asked for."""
+        object.__setattr__(self, "recorded", RecordedTracks(self.files))
 
     @property
     def name(self) -> str:
@@ -188,7 +195,7 @@ class Dataset:
         parts = list(zip(*(self.files(table) for table in ("labels", "objects", "sensors")), strict=True))
         with self.blamed():
             rows = None if wanted is None else find_rows(self.files("frame_index"), wanted)
-            yield from read_labels(parts, rows, wanted)
+            yield from read_labels(parts, rows, wanted, recorded=self.recorded)
 
     @contextmanager
     def blamed(self) -> Generator[None]:
@@ -258,7 +265,9 @@ class Dataset:
         """
         labels, objects, sensors = (self.files(table)[part] for table in ("labels", "objects", "sensors"))
         with self.blamed():
-            yield from read_labels([(labels, objects, sensors)], rows, None, motion=motion, space=False)
+            yield from read_labels(
+                [(labels, objects, sensors)], rows, None, motion=motion, space=False, recorded=self.recorded
+            )
 
     def verify(self) -> None:
         """Compare every file with its checksum.

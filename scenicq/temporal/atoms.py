@@ -20,9 +20,10 @@ from scenicq.forest.column_domain import ColumnDomain, first_direction
 from scenicq.forest.columns import DEFINED, UNDEFINED, Coded, Column, arrays_of, column_of, constant_column, truth_of
 from scenicq.forest.columns import UNKNOWN as UNOBSERVED
 from scenicq.forest.condition import expand
+from scenicq.forest.course_ends import has_ends
 from scenicq.forest.ego_frame import DISTANCE, PLACE
 from scenicq.forest.interpret import OnMap, Steps, interpret, steps_of
-from scenicq.forest.nodes import DirectionAt, Feature, Identity, Leaf, Node, Value
+from scenicq.forest.nodes import COURSE, DirectionAt, Feature, Identity, LaneCourse, Leaf, Node, Value
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.temporal import Atom
 from scenicq.forest.unobserved import certain_and_possible
@@ -164,11 +165,15 @@ class AtomColumns:
         return read
 
     def _with_bounds(self, condition: Node, found: Truth) -> Truth:
-        """The truth where a condition is the same for every speed that is not observed."""
-        open_ = found == UNKNOWN
+        """The truth where a condition is the same for every speed that is not observed, and between ends of courses."""
         # between two cells a bound of a hidden number would be another one
-        if open_.any() and any(map(_is_speed, postorder((condition,)))) and not leaves(condition):
-            certain, possible = certain_and_possible(condition, _is_speed)
+        if not (found == UNKNOWN).any() or leaves(condition):
+            return found
+        nodes = list(postorder((condition,)))
+        unobserved = [lambda _: False] if any(map(has_ends, nodes)) else []
+        for reads in [*unobserved, *([_is_speed] if any(map(_is_speed, nodes)) else [])]:
+            open_ = found == UNKNOWN
+            certain, possible = certain_and_possible(condition, reads)
             found[open_ & (self._truth(possible, {}, {}) == FALSE)] = FALSE
             found[open_ & (self._truth(certain, {}, {}) == TRUE)] = TRUE
         return found
@@ -336,6 +341,10 @@ class AtomColumns:
         if name in (PLACE, DISTANCE):
             assert isinstance(self.samples, BoundSamples)
             return self.samples.seen(self.scenario.ego, index, name)
+        if name == COURSE:
+            rules = self.scenario.objects[index].properties[COURSE].value
+            assert isinstance(rules, LaneCourse)
+            return self.samples.courses(index, rules)
         return self.samples.observed(index, name)
 
     def _feature(self, node: Feature) -> Column | None:

@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.forest.ego_frame import PLACE
-from scenicq.forest.nodes import Value
+from scenicq.forest.nodes import COURSE, LaneCourse, Value
 from scenicq.store.track_block import TrackBlock
 from scenicq.store.tracks import RecordingTracks, TrackKey
 
 __all__ = ["FIXED", "MOVING", "WITH_COLUMNS", "Binding", "BoundSamples", "Observed", "Samples"]
 
-MOVING = frozenset({"position", "heading", "velocity", "speed", "angularSpeed", "acceleration"})
+MOVING = frozenset({"position", "heading", "velocity", "speed", "angularSpeed", "acceleration", COURSE})
 """Properties that change from sample to sample: where they are not observed, nothing is known of them."""
 
 FIXED = frozenset({"width", "length", "height"})
@@ -50,6 +50,10 @@ class Observed(Protocol):
         """
         ...
 
+    def courses(self, index: int, rules: LaneCourse) -> list[Value]:
+        """The course of an object at each sample, with where on it it is; None where it is not observed."""
+        ...
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class BoundSamples:
@@ -79,6 +83,10 @@ class BoundSamples:
             return [values[code] for code in codes[mine].tolist()]
 
         return _observed(name, lambda column: self.block.numbers(column)[mine], said)
+
+    def courses(self, index: int, rules: LaneCourse) -> list[Value]:
+        """See `Observed`."""
+        return [*self.block.courses(self.members[index], rules.network, rules.gap_s)]
 
     def seen(self, ego: int, index: int, name: str) -> tuple[Numbers, ...]:
         """`PLACE` or `DISTANCE` of an object, nan where it is not known.
@@ -126,6 +134,11 @@ class Samples:
             return [each.get(name) for each in self.tracks.attributes(track)[self.first : self.end]]
 
         return _observed(name, lambda column: self.tracks.column(track, column)[self.first : self.end], said)
+
+    def courses(self, index: int, rules: LaneCourse) -> list[Value]:
+        """See `Observed`."""
+        track = self.binding[index]
+        return [self.tracks.course(track, sample, rules.network, rules.gap_s) for sample in range(self.first, self.end)]
 
 
 def _observed(

@@ -16,9 +16,11 @@ from scenicq.forest.nodes import (
     Compare,
     Constant,
     Coordinate,
+    CourseCoordinate,
     Feature,
     Identity,
     Index,
+    LaneCourse,
     Logic,
     Node,
 )
@@ -66,6 +68,10 @@ def shape_of(group: Group, ego: int, tolerance: Tolerance) -> GroupShape:
                 own = node.op
             case Coordinate():
                 own = node.axis
+            case CourseCoordinate():
+                own = node.axis, node.end
+            case LaneCourse():
+                own = id(node.network), node.gap_s
             case _ if is_leaf(node):
                 number = leaves.setdefault(node.identity, len(leaves))  # type: ignore[union-attr]
                 own = (number, node.weights if isinstance(node, Index) else ())

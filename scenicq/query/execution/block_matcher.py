@@ -194,7 +194,10 @@ class Decider:
     def _left(self, compiled: CompiledMap, among: NDArray[np.int64] | None = None) -> Iterator[Candidate]:
         """The labels that the prefilter has left, with as much of each as the matcher looks at."""
         motion, observed = compiled.motion, compiled.observed
-        return candidates(self.connection, compiled.plan, motion=motion, observed=observed, among=among)
+        recorded = self.dataset.recorded
+        return candidates(
+            self.connection, compiled.plan, motion=motion, observed=observed, among=among, recorded=recorded
+        )
 
     def _recordings(self, compiled: CompiledMap, block: Block) -> Decided:
         """Decide a block of whole recordings over time."""
@@ -218,14 +221,18 @@ class Decider:
 
             def read(wanted: NDArray[np.int64]) -> Iterator[Candidate]:
                 keep_players(self.dataset, connection, plan, block, players)
-                return candidates(connection, plan, motion=compiled.motion, among=wanted)
+                return candidates(
+                    connection, plan, motion=compiled.motion, among=wanted, recorded=self.dataset.recorded
+                )
         else:
             missed = run_prefilter(self.dataset, connection, plan, block)
             if plan.roles and (missed < 0).any():
                 rows = candidate_rows(connection, plan)
 
             def read(wanted: NDArray[np.int64]) -> Iterator[Candidate]:
-                return candidates(connection, plan, motion=compiled.motion, among=wanted)
+                return candidates(
+                    connection, plan, motion=compiled.motion, among=wanted, recorded=self.dataset.recorded
+                )
 
         left = Survivors(every[missed < 0], rows, plan.roles or (), read)
         return Decided(missed, [], [], recordings.decide(block, left))
