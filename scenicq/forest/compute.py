@@ -12,8 +12,6 @@ import operator
 from collections.abc import Callable
 from typing import cast
 
-import numpy as np
-
 from scenicq.forest.kinds import kind_of_value
 from scenicq.forest.nodes import (
     Arithmetic,
@@ -174,10 +172,9 @@ def _encloses(outer: Region, inner: Region) -> bool:
 
 
 def _course_coordinate(node: CourseCoordinate, course: CoursePlace, x: float, y: float) -> float:
-    found = course.measure(x, y)
+    low, high = course.ends(x, y)[2 * node.axis : 2 * node.axis + 2]
     if node.end is not None:
-        return float(np.clip(found.end(node.axis, node.end)[0], -FAR_M, FAR_M))
-    low, high = (float(found.end(node.axis, end)[0]) for end in (0, 1))
+        return min(max(high if node.end else low, -FAR_M), FAR_M)
     if low != high:
         where = "of the course" if math.isfinite(low) and math.isfinite(high) else "beyond the end of the course"
         raise CannotEvaluate(f"which place {where} it is at")

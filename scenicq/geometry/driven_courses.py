@@ -2,7 +2,8 @@
 
 Points under `MERGED_M` apart count as one, as boxes of what stands still jitter. Beyond its ends a course goes on along
 the centreline of the lane there and of those that it leads to (joining it within `JOIN_M`), and where there is none
-along the heading, for `BEYOND_M`. The course of what is seen at one place alone is that of its lane, both ways.
+along the heading, for `BEYOND_M`, as if it were driven at `BEYOND_MPS`. The course of what is seen at one place alone
+is that of its lane, both ways.
 
 A place is measured from its *foot*, the nearest point of the course. A course may come by a place several times: it
 does so wherever it is at most `PASS_M` farther from it than at its nearest, and of these passes the one that is nearest
@@ -40,6 +41,8 @@ GAP_S = 1.5
 """Seconds without a label at which a course is cut, if nothing else is said."""
 BEYOND_M = 50.0
 """How far a course goes on beyond its ends."""
+BEYOND_MPS = 10.0
+"""How fast a course counts as driven beyond its ends."""
 MERGED_M = 0.5
 """Points of a track that are nearer to each other than this count as one."""
 JOIN_M = 10.0
@@ -48,11 +51,17 @@ PASS_M = 3.5
 """How much farther from a place than at its nearest a course may be to come by it."""
 ALONG_RAD = math.radians(60)
 """How far the direction of a lane may be from a heading that it leads on."""
+_END = ""
+"""The name of the end of a course, from which others lead on."""
 _EQUAL_M = 1e-6
 """Distances that differ by less are equal."""
+_ONE_M = 0.01
+"""Feet that are nearer to each other than this are one."""
 _EQUAL_S = 1e-9
-_STEP_M = 2.0
-"""Between the points at which a course is worked out while it joins the centreline."""
+_JOINT_M = 1.0
+"""How far apart lanes may begin at a place for one to go on in the other."""
+_KNOWN = 4096
+"""Measures that are kept of a course."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,11 +108,16 @@ class CourseLine:
 
     Attributes:
         pieces: What it is made of.
+        joints: Segments with which pieces end, each with one with which another goes on.
+        known: What has been measured from it.
     """
 
-    def __init__(self, pieces: Sequence[_Piece]) -> None:
-        """Take the pieces."""
+    def __init__(self, pieces: Sequence[_Piece], joints: Sequence[tuple[int, int]]) -> None:
+        """Take the pieces, and pairs of them of which the second goes on where the first ends."""
         self.pieces = tuple(pieces)
+        firsts = np.cumsum([0, *(len(each.xy) - 1 for each in pieces)]).tolist()
+        self.joints = [(firsts[one + 1] - 1, firsts[other]) for one, other in joints]
+        self.known: dict[tuple[float, ...], tuple[float, float, float, float]] = {}
         self.start = np.concatenate([each.xy[:-1] for each in pieces])
         self.step = np.concatenate([np.diff(each.xy, axis=0) for each in pieces])
         self.length = np.hypot(*self.step.T)
@@ -154,9 +168,19 @@ class CoursePlace:
     time_s: float = 0.0
     sign: float = 1.0
 
-    def measure(self, x: float, y: float) -> Measures:
-        """How far a place is along and beside the course; arrays of shape (1,)."""
-        return measured([self], np.array([[x, y]]))
+    def ends(self, x: float, y: float) -> tuple[float, float, float, float]:
+        """The ends between which a place is along and beside the course; the same question is answered once."""
+        if self.line is None:
+            return -math.inf, math.inf, -math.inf, math.inf
+        known, asked = self.line.known, (self.s, self.time_s, self.sign, x, y)
+        found = known.get(asked)
+        if found is None:
+            if len(known) >= _KNOWN:
+                known.clear()
+            measures = measured([self], np.array([[x, y]]))
+            low, high, right, left = (float(each[0]) for each in (*measures.along, *measures.beside))
+            found = known[asked] = low, high, right, left
+        return found
 
 
 NO_COURSE = CoursePlace(None)
@@ -207,6 +231,10 @@ def _of_line(line: CourseLine, own: Numbers, xy: Numbers) -> tuple[Numbers, NDAr
     goes_on = np.zeros((n, m), np.bool_)
     goes_on[:, 1:] = active[:, 1:] & active[:, :-1] & line.linked[1:] & (from_start[:, 1:] <= reach)
     passes = np.cumsum(active & ~goes_on, axis=1) - 1 + (np.arange(n) * (m + 1))[:, None]
+    for end, start in line.joints:
+        together = active[:, end] & active[:, start] & (from_start[:, start] <= reach[:, 0])
+        for row in np.flatnonzero(together & (passes[:, end] != passes[:, start])).tolist():
+            passes[row, passes[row] == passes[row, start]] = passes[row, end]
     least = np.full(n * (m + 1), np.inf)
     np.minimum.at(least, passes[active], away[active])
     near = active & (away <= np.where(active, least[np.maximum(passes, 0)], -np.inf) + _EQUAL_M)
@@ -231,9 +259,9 @@ def _of_line(line: CourseLine, own: Numbers, xy: Numbers) -> tuple[Numbers, NDAr
         np.where(feet, np.where(outside, -np.inf, left), np.inf).min(axis=1),
         np.where(feet, np.where(outside, np.inf, left), -np.inf).max(axis=1),
     ])  # fmt: skip
-    # feet that differ by rounding alone are one
+    # feet on both sides of a corner are one
     for start in (0, 2):
-        same = found[:, start + 1] - found[:, start] <= _EQUAL_M
+        same = found[:, start + 1] - found[:, start] <= _ONE_M
         found[same, start + 1] = found[same, start]
     return found, (feet & line.extended).any(axis=1)
 
@@ -297,7 +325,10 @@ def _stretch(network: Network, times: Numbers, places: Numbers) -> list[CoursePl
     back = _onwards(network, *ends[1][:3], join=True)
     pieces = [own, *(_forward(each, float(starts[-1]), ends[0][3]) for each in onwards),
               *(_backward(each, ends[1][3]) for each in back)]  # fmt: skip
-    line = CourseLine(pieces)
+    ahead, behind = _links(onwards, 1), _links(back, 1 + len(onwards))
+    joints = [(0 if one is None else one, other) for one, other in ahead]
+    joints += [(other, 0 if one is None else one) for one, other in behind]
+    line = CourseLine(pieces, joints)
     found: list[CoursePlace] = []
     for number, corner in enumerate(which):
         best: tuple[float, int, float] | None = None
@@ -339,10 +370,15 @@ def _of_one_place(network: Network, times: Numbers, places: Numbers) -> list[Cou
     faces = np.array(direction(heading))
     onwards = _onwards(network, corner, faces, heading, join=False)
     back = _onwards(network, corner, -faces, heading, join=False)
-    # nothing tells an earlier place on it from a later one
-    span = (float(times[0]), float(times[-1]))
-    pieces = [*(_forward(each, 0.0, *span) for each in onwards), *(_backward(each, *span) for each in back)]
-    line = CourseLine(pieces)
+    pieces = [*(_forward(each, 0.0, float(times[-1])) for each in onwards),
+              *(_backward(each, float(times[0])) for each in back)]  # fmt: skip
+    ahead, behind = _links(onwards, 0), _links(back, len(onwards))
+    joints = [(one, other) for one, other in ahead if one is not None]
+    joints += [(other, one) for one, other in behind if one is not None]
+    firsts, lasts = ([other for one, other in links if one is None] for links in (ahead, behind))
+    joints += [(last, first) for last in lasts for first in firsts
+               if np.hypot(*(pieces[last].xy[-1] - pieces[first].xy[0])) <= _JOINT_M]  # fmt: skip
+    line = CourseLine(pieces, joints)
     return [
         CoursePlace(line, float((places[number, :2] - corner) @ faces), float(time))
         for number, time in enumerate(times.tolist())
@@ -351,22 +387,49 @@ def _of_one_place(network: Network, times: Numbers, places: Numbers) -> list[Cou
 
 @dataclass(frozen=True, slots=True)
 class _Onward:
-    """A polyline that leads away from an end: its points, how far from the end it begins, whether all ends there."""
+    """A polyline that leads away from an end of a course.
+
+    Attributes:
+        xy: Its points, shape (n, 2).
+        far: How far from the end it begins.
+        is_last: Whether the course ends with it.
+        name: The lane that it follows.
+        after: The names of what it goes on from.
+    """
 
     xy: Numbers
     far: float
     is_last: bool
+    name: str = ""
+    after: Sequence[str] = (_END,)
 
 
-def _forward(each: _Onward, s: float, *times: float) -> _Piece:
-    when = np.tile(np.array([times[0], times[-1]]), (len(each.xy), 1))
-    return _Piece(each.xy, s + each.far, when, open_end=each.is_last)
+def _links(onwards: Sequence[_Onward], first: int) -> list[tuple[int | None, int]]:
+    """Which of some polylines leads to which, by numbers from a first one on; None for the end of the course."""
+    number = {each.name: first + place for place, each in enumerate(onwards)}
+    return [
+        (None if name == _END else number[name], first + place)
+        for place, each in enumerate(onwards)
+        for name in each.after
+        if name == _END or name in number
+    ]
 
 
-def _backward(each: _Onward, *times: float) -> _Piece:
-    when = np.tile(np.array([times[0], times[-1]]), (len(each.xy), 1))
-    length = float(np.hypot(*np.diff(each.xy, axis=0).T).sum())
-    return _Piece(each.xy[::-1], -each.far - length, when, open_start=each.is_last)
+def _forward(each: _Onward, s: float, time: float) -> _Piece:
+    when = time + (each.far + _lengths(each.xy)) / BEYOND_MPS
+    return _Piece(each.xy, s + each.far, np.column_stack([when, when]), open_end=each.is_last)
+
+
+def _backward(each: _Onward, time: float) -> _Piece:
+    lengths = _lengths(each.xy)
+    when = (time - (each.far + lengths) / BEYOND_MPS)[::-1]
+    s = -each.far - float(lengths[-1])
+    return _Piece(each.xy[::-1], s, np.column_stack([when, when]), open_start=each.is_last)
+
+
+def _lengths(line: Numbers) -> Numbers:
+    """How far along a polyline its points are."""
+    return np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))))
 
 
 def _onwards(network: Network, end: Numbers, outward: Numbers, heading: float, *, join: bool) -> list[_Onward]:
@@ -379,8 +442,9 @@ def _onwards(network: Network, end: Numbers, outward: Numbers, heading: float, *
         heading: That of the box there; nan where it is not known.
         join: Whether the course goes over from the end to the centreline; else it begins on it.
     """
+    ways: list[bool] = []
     faces = outward if math.isnan(heading) else np.array(direction(heading))
-    found: list[_Onward] = []
+    starts: list[tuple[Lane, Numbers, Numbers | None]] = []
     for lane in network.lanesAt(float(end[0]), float(end[1])):
         line = _centreline(lane)
         if line is None:
@@ -392,25 +456,36 @@ def _onwards(network: Network, end: Numbers, outward: Numbers, heading: float, *
         foot = line[segment] + part * step
         forward = float(step @ outward) >= 0
         rest = [foot, *line[segment + 1 :]] if forward else [foot, *line[segment::-1]]
-        found += _along_lanes(lane, np.array(rest), end - foot if join else None, forward=forward)
+        starts.append((lane, _without_equals(np.array(rest)), end - foot if join else None))
+        ways.append(forward)
+    found = [each for way in (True, False) for each in _along_lanes(
+        [start for start, forward in zip(starts, ways, strict=True) if forward is way], forward=way
+    )]  # fmt: skip
     if not found:
         ahead = outward if float(faces @ outward) == 0 else faces * math.copysign(1.0, float(faces @ outward))
         found = [_Onward(np.array([end, end + BEYOND_M * ahead]), 0.0, is_last=True)]
     return found
 
 
-def _along_lanes(lane: Lane, rest: Numbers, aside: Numbers | None, *, forward: bool) -> list[_Onward]:
-    """The rest of a lane and the lanes that it leads to (or that lead to it), each once, by its nearest beginning."""
+def _along_lanes(starts: Sequence[tuple[Lane, Numbers, Numbers | None]], *, forward: bool) -> list[_Onward]:
+    """The rests of lanes and the lanes that they lead to (or that lead to them), each once, by its nearest beginning.
+
+    Args:
+        starts: The lanes, with what is left of their centrelines and from how far beside these the course comes.
+        forward: Whether it goes on in the direction of travel.
+    """
     found: list[_Onward] = []
-    begins: dict[str, float] = {lane.id: 0.0}
-    waiting = [(0.0, 0, lane, _without_equals(rest))]
+    begins = {lane.id: 0.0 for lane, _, _ in starts}
+    # the lanes that each is led to by; of starts the end itself
+    after: dict[str, list[str]] = {lane.id: [_END] for lane, _, _ in starts}
+    waiting = [(0.0, number, *start) for number, start in enumerate(starts)]
+    count = len(starts)
     while waiting:
-        far, _, now, line = heapq.heappop(waiting)
+        far, _, now, line, aside = heapq.heappop(waiting)
         if far > begins[now.id]:
             continue
         own = _cut(line, BEYOND_M - far)
-        length = float(np.hypot(*np.diff(line, axis=0).T).sum())
-        end = far + length
+        end = far + float(_lengths(line)[-1])
         following = (now.successors if forward else now.predecessors) if end < BEYOND_M else ()
         leads_on = False
         for each in following:
@@ -418,15 +493,18 @@ def _along_lanes(lane: Lane, rest: Numbers, aside: Numbers | None, *, forward: b
             if others is None:
                 continue
             leads_on = True
+            after.setdefault(each.id, []).append(now.id if len(line) > 1 else _END)
             if end < begins.get(each.id, math.inf):
                 begins[each.id] = end
-                heapq.heappush(waiting, (end, len(begins), each, others if forward else others[::-1]))
+                count += 1
+                heapq.heappush(waiting, (end, count, each, others if forward else others[::-1], aside))
         if end < BEYOND_M and not leads_on and len(line) > 1:
             # the map ends here
             last = line[-1] - line[-2]
             own = np.vstack([line, line[-1] + (BEYOND_M - end) * last / np.hypot(*last)])
         if len(own) > 1:
-            found.append(_Onward(own if aside is None else _joined(own, far, aside), far, not leads_on))
+            xy = own if aside is None else _joined(own, far, aside)
+            found.append(_Onward(xy, far, not leads_on, now.id, after[now.id]))
     return found
 
 
@@ -434,16 +512,16 @@ def _joined(line: Numbers, far: float, aside: Numbers) -> Numbers:
     """A part of a course that comes from beside the centreline and joins it."""
     if far >= JOIN_M:
         return line
-    lengths = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))))
-    steps = np.arange(0.0, JOIN_M + _STEP_M / 2, _STEP_M) - far
-    at = np.unique(np.concatenate((lengths, steps[(steps > 0) & (steps < lengths[-1])])))
+    lengths = _lengths(line)
+    # between corners of the centreline it comes nearer evenly
+    at = np.union1d(lengths, [JOIN_M - far]) if JOIN_M - far < lengths[-1] else lengths
     points = np.column_stack([np.interp(at, lengths, line[:, axis]) for axis in (0, 1)])
     return _without_equals(points + np.maximum(0.0, 1.0 - (at + far) / JOIN_M)[:, None] * aside)
 
 
 def _cut(line: Numbers, length: float) -> Numbers:
     """The beginning of a polyline."""
-    lengths = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))))
+    lengths = _lengths(line)
     if lengths[-1] <= length:
         return line
     kept = int(np.searchsorted(lengths, length, side="left"))
