@@ -27,8 +27,10 @@ from scenicq.compiler.values import Choice, Instance, ModelValue, fail, is_node
 from scenicq.compiler.version_detection import decide_version
 from scenicq.errors import Diagnostic, ScenarioError, Source, Span
 from scenicq.forest.compute import fold
-from scenicq.forest.nodes import Constant, Encloses, Intersects, Node, Undefined
+from scenicq.forest.course_ends import has_ends
+from scenicq.forest.nodes import COURSE, Constant, Encloses, Intersects, Node, Undefined
 from scenicq.forest.scenario import BuiltIn, Property, Requirement, Scenario, ScenarioObject
+from scenicq.forest.walk import postorder
 from scenicq.geometry.driven_courses import GAP_S
 from scenicq.geometry.elements import NetworkElement
 from scenicq.geometry.network import Network
@@ -198,7 +200,10 @@ def _scenario(
     requirements += _built_in(run, ego)
     ego.label = "ego"
     names = _names(run.objects)
-    objects = tuple(_object(instance, names[number]) for number, instance in enumerate(run.objects))
+    on_courses = any(COURSE in instance.properties for instance in run.objects)
+    objects = tuple(
+        _object(instance, names[number], on_courses=on_courses) for number, instance in enumerate(run.objects)
+    )
     check_directions(objects, requirements)
     params = {
         name: Property(_at_the_end(partial(to_node, value, span), span), explicit=not library, span=span)
@@ -270,7 +275,14 @@ def _is_feature(value: ModelValue) -> bool:
     return is_node(value) or value is None or isinstance(value, str | int | float | bool | NetworkElement)
 
 
-def _object(instance: Instance, name: str) -> ScenarioObject:
+def _object(instance: Instance, name: str, *, on_courses: bool) -> ScenarioObject:
+    """An object as it is matched.
+
+    Args:
+        instance: The object.
+        name: What it is called.
+        on_courses: Whether the program asks for courses.
+    """
     properties: dict[str, Property] = {}
     uncomparable: dict[str, Span | None] = {}
     for key, value in instance.properties.items():
@@ -281,6 +293,11 @@ def _object(instance: Instance, name: str) -> ScenarioObject:
         if key in ("width", "length") and isinstance(node, Constant) and cast(float, node.value) <= 0:
             raise fail("wrong-value", f"the {key} of an object must be positive", span, "not positive")
         if node is not None:
+            asked = next((each for each in postorder((node,)) if has_ends(each)), None) if on_courses else None
+            if asked is not None:
+                raise fail("unsupported-construct", "`along` and `beside` ask what labels show: put them in `require`",
+                           asked.span or span, "not in a property",
+                           ("place the object with other words, and require this of it",))  # fmt: skip
             properties[key] = Property(node, key in instance.explicit, span)
         elif key in instance.explicit and value is not None:
             uncomparable[key] = span

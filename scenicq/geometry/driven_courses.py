@@ -25,7 +25,7 @@ from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
-from shapely.geometry import LineString, Polygon
+from shapely.geometry import LineString, MultiPolygon, Polygon
 
 from scenicq.geometry import shapes
 from scenicq.geometry.angles import direction
@@ -117,6 +117,7 @@ class CourseLine:
         self.pieces = tuple(pieces)
         firsts = np.cumsum([0, *(len(each.xy) - 1 for each in pieces)]).tolist()
         self.joints = [(firsts[one + 1] - 1, firsts[other]) for one, other in joints]
+        self._corridors: dict[float, PolygonSet] = {}
         self.known: dict[tuple[float, ...], tuple[float, float, float, float]] = {}
         self.start = np.concatenate([each.xy[:-1] for each in pieces])
         self.step = np.concatenate([np.diff(each.xy, axis=0) for each in pieces])
@@ -142,8 +143,10 @@ class CourseLine:
         """What lies within so many metres of the line."""
         if half_width == 0:
             return self.region
-        parts = tuple(cast(Polygon, shapes.round_band(each, half_width)) for each in self.region.lines)
-        return PolygonSet(parts, "the corridor")
+        if half_width not in self._corridors:
+            whole = shapes.union_all([shapes.round_band(each, half_width) for each in self.region.lines])
+            self._corridors[half_width] = PolygonSet((cast("Polygon | MultiPolygon", whole),), "the corridor")
+        return self._corridors[half_width]
 
 
 def _at(place: int, size: int, value: bool) -> NDArray[np.bool_]:

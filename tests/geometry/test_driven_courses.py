@@ -1,4 +1,4 @@
-"""Courses by segments against courses by their definition (`tests/oracle/courses.py`), over random tracks and places."""
+"""Courses against their definition (`tests/oracle/courses.py`), over random tracks and places."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 from courses import Course, Lanes, Sample, lanes_of
 
 from scenicq.geometry.default_street import street
-from scenicq.geometry.driven_courses import BEYOND_M, lane_course, track_courses
+from scenicq.geometry.driven_courses import track_courses
 from scenicq.geometry.network import Network
 
 NOWHERE = Network("none", ())

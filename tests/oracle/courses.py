@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
 from shapely import Point
@@ -102,7 +103,7 @@ class Course:
     def _line(self, points: Sequence[XY], s: float, times: Sequence[tuple[float, float]], driven: bool) -> list[int]:
         """Spots along a polyline, from its first point to its last."""
         made: list[int] = []
-        for (one, other), (before, after) in zip(zip(points, points[1:]), zip(times, times[1:])):
+        for (one, other), (before, after) in zip(pairwise(points), pairwise(times), strict=True):
             length = math.dist(one, other)
             count = max(1, round(length / STEP))
             for k in range(count + 1):
@@ -115,7 +116,7 @@ class Course:
                 self.spots.append(Spot(at, s + part * length, first, last, driven))
                 made.append(len(self.spots) - 1)
             s += length
-        for a, b in zip(made, made[1:]):
+        for a, b in pairwise(made):
             self._tie(a, b)
         return made
 
@@ -153,7 +154,7 @@ class Course:
         # where the object is: beside the corner that it is at, on the parts before and behind that
         corner = which[self.own]
         best = None
-        lengths = [math.dist(a, b) for a, b in zip(points, points[1:])]
+        lengths = [math.dist(a, b) for a, b in pairwise(points)]
         for part in (corner, corner - 1):
             if not 0 <= part < len(lengths):
                 continue
@@ -189,7 +190,7 @@ class Course:
         for name in near:
             line = self.lanes[name].line
             at = line.project(here)
-            parts = [LineString(pair) for pair in zip(line.coords, line.coords[1:])]
+            parts = [LineString(pair) for pair in pairwise(line.coords)]
             # at a corner the part that comes first counts
             nearest = min(parts, key=lambda part: round(part.distance(here), 9))
             course = less(nearest.coords[1], nearest.coords[0])
@@ -231,7 +232,8 @@ class Course:
             far, now, at, aside, tied = waiting.pop(0)
             if now in done:
                 # another way has led here before
-                self._tie(tied, first[now])
+                if tied is not None and now in first:
+                    self._tie(tied, first[now])
                 continue
             done.add(now)
             lane = self.lanes[now]
@@ -244,7 +246,7 @@ class Course:
             places = [k * whole / 800 for k in range(801)] if whole > 1e-9 else []
             spots = [self._at(lane.line, at + d if forward else at - d) for d in places]
             fade = [max(0.0, 1 - (far + d) / JOIN) for d in places]
-            points = [(x + f * aside[0], y + f * aside[1]) for (x, y), f in zip(spots, fade)]
+            points = [(x + f * aside[0], y + f * aside[1]) for (x, y), f in zip(spots, fade, strict=False)]
             if len(points) > 1:
                 made = self._outward(points, s, far, time, way, tied, ends=is_last)
                 heads += [made[0]] if far == 0 else []
@@ -293,8 +295,8 @@ class Course:
             for part in passes:
                 nearest = min(away[k] for k in part)
                 lateness.append(min(late(k) for k in part if away[k] <= nearest + 1e-9))
-            timely = [part for part, each in zip(passes, lateness) if each <= min(lateness) + slack]
-            sure = [part for part, each in zip(passes, lateness) if each <= min(lateness) + 1e-9]
+            timely = [part for part, each in zip(passes, lateness, strict=False) if each <= min(lateness) + slack]
+            sure = [part for part, each in zip(passes, lateness, strict=False) if each <= min(lateness) + 1e-9]
             best = max(min(away[k] for k in part) for part in sure)
             for part in timely:
                 for k in part:
