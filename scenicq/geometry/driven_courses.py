@@ -7,7 +7,8 @@ is that of its lane, both ways.
 
 A place is measured from its *foot*, the nearest point of the course. A course may come by a place several times: it
 does so wherever it is at most `PASS_M` farther from it than at its nearest, and of these passes the one that is nearest
-in time to where the object itself is counts. What is measured lies between two numbers, which are equal but where
+in time to where the object itself is counts; of those that are so but for `SOON_S`, as where lanes part, the one that
+is nearest to the place. What is measured lies between two numbers, which are equal but where
 several feet are equally near (between their values), and beyond the end (at least what is left).
 
 Metres, seconds, radians. Ahead is where the object's box faces, left is positive.
@@ -57,7 +58,8 @@ _EQUAL_M = 1e-6
 """Distances that differ by less are equal."""
 _ONE_M = 0.01
 """Feet that are nearer to each other than this are one."""
-_EQUAL_S = 1e-9
+SOON_S = 1.0
+"""Passes of which one is nearer in time by less are equally near."""
 _JOINT_M = 1.0
 """How far apart lanes may begin at a place for one to go on in the other."""
 _KNOWN = 4096
@@ -244,7 +246,7 @@ def _of_line(line: CourseLine, own: Numbers, xy: Numbers) -> tuple[Numbers, NDAr
     late = _time_apart(line, part, own[:, 1:2])
     soonest = np.where(near, late, np.inf).min(axis=1, keepdims=True)
     timely = np.zeros(n * (m + 1), np.bool_)
-    timely[passes[near & (late <= soonest + _EQUAL_S)]] = True
+    timely[passes[near & (late <= soonest + SOON_S)]] = True
     feet = near & timely[np.maximum(passes, 0)]
     best = np.where(feet, away, np.inf).min(axis=1, keepdims=True)
     feet &= away <= best + _EQUAL_M

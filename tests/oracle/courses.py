@@ -17,7 +17,7 @@ from shapely.geometry import LineString
 from shapely.geometry.base import BaseGeometry
 
 STEP = 0.02
-BEYOND, MERGED, JOIN, PASS = 50.0, 0.5, 10.0, 3.5
+BEYOND, MERGED, JOIN, PASS, SOON = 50.0, 0.5, 10.0, 3.5, 1.0
 XY = tuple[float, float]
 
 
@@ -246,7 +246,7 @@ class Course:
             places = [k * whole / 800 for k in range(801)] if whole > 1e-9 else []
             spots = [self._at(lane.line, at + d if forward else at - d) for d in places]
             fade = [max(0.0, 1 - (far + d) / JOIN) for d in places]
-            points = [(x + f * aside[0], y + f * aside[1]) for (x, y), f in zip(spots, fade, strict=False)]
+            points = [(x + f * aside[0], y + f * aside[1]) for (x, y), f in zip(spots, fade, strict=True)]
             if len(points) > 1:
                 made = self._outward(points, s, far, time, way, tied, ends=is_last)
                 heads += [made[0]] if far == 0 else []
@@ -295,13 +295,13 @@ class Course:
             for part in passes:
                 nearest = min(away[k] for k in part)
                 lateness.append(min(late(k) for k in part if away[k] <= nearest + 1e-9))
-            timely = [part for part, each in zip(passes, lateness, strict=False) if each <= min(lateness) + slack]
-            sure = [part for part, each in zip(passes, lateness, strict=False) if each <= min(lateness) + 1e-9]
-            best = max(min(away[k] for k in part) for part in sure)
+            timely = [part for part, each in zip(passes, lateness, strict=True) if each <= min(lateness) + SOON + slack]
+            sure = [part for part, each in zip(passes, lateness, strict=True) if each <= min(lateness) + SOON - slack]
+            best = min(min(away[k] for k in part) for part in sure)
             for part in timely:
                 for k in part:
                     low = all(away[k] <= away[other] for other in self.spots[k].near)
-                    if low and away[k] <= max(best, min(away[n] for n in part)) + slack:
+                    if low and away[k] <= best + slack:
                         # at a sharp corner a place may be on either side
                         for other in self.spots[k].near:
                             value = self._value(k, other, place)

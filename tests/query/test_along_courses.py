@@ -118,7 +118,7 @@ class Drawn:
     def __init__(self, folder: Path, network: Network, seed: int) -> None:
         draw, lanes = random.Random(seed), lanes_of(network.features)
         recordings: list[Recording] = []
-        self.frames: dict[str, tuple[list, list, list]] = {}
+        self.frames: dict[str, tuple[list, list]] = {}
         for number in range(9):
             name, count = f"r{number}", draw.choice([1, 5, 9])
             ego = _drive(draw, lanes, count)
@@ -131,11 +131,8 @@ class Drawn:
                 me = LabelObject("ego", "Car", "car", *mine[1:], 1.8, 4.5)
                 frame = f"{name}-{k}"
                 labels.append(Label(frame, name, round(mine[0] * 1e6), network.name, me, objects))
-                told = [
-                    Course(ego, k, lanes, 1.5).plausible(its[1:3]),
-                    Course(other, k, lanes, 1.5).plausible(mine[1:3]),
-                ]
-                self.frames[frame] = told[0], told[1], []
+                told = Course(ego, k, lanes, 1.5).plausible(its[1:3])
+                self.frames[frame] = told, Course(other, k, lanes, 1.5).plausible(mine[1:3])
             recordings.append(Recording(name, network.name, tuple(labels)))
         maps = {network.name: network.features} if network.features else {}
         write_dataset(folder, recordings, maps, name="d")
@@ -144,7 +141,7 @@ class Drawn:
     def truths(self, condition: str) -> dict[str, bool | None]:
         """What a condition is in each frame in which the definition is clear."""
         found: dict[str, bool | None] = {}
-        for frame, (ahead, behind, _) in self.frames.items():
+        for frame, (ahead, behind) in self.frames.items():
             if len(ahead) == len(behind) == 1 and not self._at_edge(ahead[0]) and not self._at_edge(behind[0]):
                 (along, beside), (other, _) = self._intervals(ahead[0]), self._intervals(behind[0])
                 found[frame] = CONDITIONS[condition](along, beside, other)
@@ -209,16 +206,15 @@ def test_over_time_each_sample_is_what_the_frame_is(drawn: Drawn, condition: str
 
 def test_a_corridor_holds_what_is_beside_the_course(drawn: Drawn) -> None:
     asked = _found(drawn.dataset, f"{HEAD}require c.position in corridor(ego, 2)\n")
-    placed = HEAD.replace(
-        "c = new Object at (Range(-999, 999), Range(-999, 999))", "c = new Object on corridor(ego, 2)"
-    )
+    anywhere = "c = new Object at (Range(-999, 999), Range(-999, 999))"
+    placed = HEAD.replace(anywhere, "c = new Object in corridor(ego, 2)")
     loose = _found(drawn.dataset, placed)
     exact = _found(drawn.dataset, f"{HEAD}require (distance from c to course(ego)) <= 2\n")
     assert exact == asked
     boxes = _found(drawn.dataset, f"{HEAD}require c in corridor(ego, 2)\n")
     assert set(boxes) < set(asked)
     assert set(asked) <= set(loose)  # within tolerance
-    clear = [frame for frame, (ahead, _, _) in drawn.frames.items() if len(ahead) == 1 and ahead[0][1] is not None]
+    clear = [frame for frame, (ahead, _) in drawn.frames.items() if len(ahead) == 1 and ahead[0][1] is not None]
     near = {frame for frame in clear if abs(drawn.frames[frame][0][0][1]) < 1.9}
     assert near
     assert near <= set(asked)
