@@ -138,7 +138,7 @@ def _scaled(op: ArithmeticOp, args: list[Truths], made: Callable[..., Node]) -> 
     if op is ArithmeticOp.MUL and isinstance(one[0], Constant):
         one, other = other, one
     factor = other[0]
-    if not isinstance(factor, Constant) or not isinstance(factor.value, float) or factor.value == 0:
+    if not isinstance(factor, Constant) or not isinstance(factor.value, float) or factor.value == 0.0:
         return None
     low, high = (made(op, each, factor) for each in one)
     return (low, high) if factor.value > 0 else (high, low)

@@ -140,7 +140,7 @@ class RecordedTracks:
         return self._open[1:]
 
     def _find_runs(self) -> dict[str, tuple[int, int, int]]:
-        """Of each recording the part that has it, and the rows of its labels there, the last left out."""
+        """The part that has each recording, and the rows of its labels there, the last left out."""
         found: dict[str, tuple[int, int, int]] = {}
         for part, file in enumerate(self._files("labels")):
             with RowFile(file, ["recording"]) as rows:

@@ -49,6 +49,10 @@ def _is_speed(node: Node) -> bool:
     return isinstance(node, Feature) and node.property == "speed"
 
 
+def _is_none(_: Node) -> bool:
+    return False
+
+
 class UnclearVariable(Exception):
     """What a condition over time hangs on a random variable for is not known by arrays; the message says why."""
 
@@ -170,7 +174,8 @@ class AtomColumns:
         if not (found == UNKNOWN).any() or leaves(condition):
             return found
         nodes = list(postorder((condition,)))
-        unobserved = [lambda _: False] if any(map(has_ends, nodes)) else []
+        # first as if all speeds were observed
+        unobserved: list[Callable[[Feature], bool]] = [_is_none] if any(map(has_ends, nodes)) else []
         for reads in [*unobserved, *([_is_speed] if any(map(_is_speed, nodes)) else [])]:
             open_ = found == UNKNOWN
             certain, possible = certain_and_possible(condition, reads)
