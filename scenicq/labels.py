@@ -79,7 +79,7 @@ def _course(owner: Any) -> Any:
 
 
 def _corridor(owner: Any, half_width: float) -> Any:
-    polygons = cast(Any, _line_of(owner).within(float(half_width))).polygons
+    polygons = _line_of(owner).within(float(half_width)).polygons
     return import_module("scenic.core.regions").PolygonalRegion(polygon=polygons[0])
 
 

@@ -10,6 +10,7 @@ import sys
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -81,7 +82,8 @@ class Dataset:
 
     def __post_init__(self) -> None:
         """Nothing of its tracks is read before it is asked for."""
-        object.__setattr__(self, "recorded", RecordedTracks(self.files))
+        # not of the dataset itself, which would live until somebody looks for circles
+        object.__setattr__(self, "recorded", RecordedTracks(partial(_files, self.place, self.manifest)))
 
     @property
     def name(self) -> str:
@@ -131,7 +133,7 @@ class Dataset:
 
     def files(self, table: str) -> tuple[StoreFile, ...]:
         """A table's Parquet files, in the order of their rows; absolute paths where they are on this machine."""
-        return tuple(map(self.place.file, self.manifest.tables[table]))
+        return _files(self.place, self.manifest, table)
 
     def scan(self, table: str, part: int | None = None, *, numbered: bool = False) -> str:
         """What SQL selects from to read a table; see `scans.scan`.
@@ -283,6 +285,10 @@ class Dataset:
                 problems.append(Diagnostic("store-damaged", f"{part.path} has changed since it was written"))
         if problems:
             raise DataError(list(dict.fromkeys(problems)))
+
+
+def _files(place: Place, manifest: Manifest, table: str) -> tuple[StoreFile, ...]:
+    return tuple(map(place.file, manifest.tables[table]))
 
 
 def open_dataset(address: str | Path, *, older: bool = False, check: bool = True) -> Dataset:
