@@ -68,6 +68,7 @@ class TrackBlock:
         object_starts: Where the members that are objects of each label begin, and where the last one's end, shape
             (n + 1,).
         label_of: The label of each member, shape (m + n + 1,).
+        recorded: The tracks of the dataset's recordings.
         object_count: How many members are label objects.
         size: How many members there are: m label objects and n egos.
     """
@@ -85,7 +86,7 @@ class TrackBlock:
             rows: Rows of label objects in their part, in order, whose tracks are asked about; None for all tracks.
             reach: How much of these tracks is asked about; None for all of it.
         """
-        self._recorded = dataset.recorded
+        self.recorded = dataset.recorded
         self._labels = RowColumns(dataset.files("labels")[part], [f"ego_{name}" for name in _CODED])
         self._objects = RowColumns(dataset.files("objects")[part], [*_CODED, "track"])
         self.first_label, self._end = runs[0][0], runs[-1][1]
@@ -337,7 +338,7 @@ class TrackBlock:
             label = int(labels[place])
             number = int(self.recording_of[label])
             if number not in names:
-                names = {number: self._recorded.of(self.name(number))}
+                names = {number: self.recorded.of(self.name(number))}
             sample, member = label - self.runs[number][0], int(members[place])
             track = self.key(member)
             seen = None if track[0] == "object" else names[number].course(network, gap_s, track, sample)

@@ -22,6 +22,7 @@ from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.verdict import Match, Unknown
 from scenicq.query.execution.run import Query, QueryOptions
+from scenicq.query.explain.advice import advice
 from scenicq.store.dataset import Dataset, open_dataset
 from scenicq.store.labels import Label, LabelObject, Recording
 from scenicq.store.writer import write_dataset
@@ -271,3 +272,27 @@ def test_what_has_no_course_is_refused_by_name(line: str) -> None:
     (diagnostic,) = error.value.diagnostics
     assert diagnostic.code == code
     assert words in diagnostic.message
+
+
+def test_with_a_hidden_number_each_start_has_the_course_of_its_track(drawn: Drawn) -> None:
+    """What a label at the start leaves of a hidden number hangs on what its object drives, in frames and over time."""
+    hidden = f"{HEAD}d = Range(0, 12)\nrequire 0 < along(ego, c) + d < 6\n"
+    frames = _found(drawn.dataset, hidden)
+    told = drawn.truths("0 < along(ego, c) < 20")
+    clear = {frame: drawn.frames[frame][0][0] for frame in told if drawn.frames[frame][0][0][2] == 0}
+    assert clear
+    for frame, (along, _, _) in clear.items():
+        if min(abs(along + 12), abs(along - 6)) > 0.1:
+            assert frames.get(frame, False) is (-12 < along < 6), frame
+    over_time = f"{HEAD}d = Range(0, 12)\nrequire 0 < along(ego, c) + d < 6\nrequire always d > -1\n"
+    found = _found(drawn.dataset, over_time, time=IntervalOptions(intervals="all"))
+    assert {frame for frame, truth in found.items() if truth} == {frame for frame, truth in frames.items() if truth}
+
+
+def test_advice_counts_by_the_courses_of_tracks(drawn: Drawn) -> None:
+    text = f"{HEAD}require along(ego, c) > 3\nrequire (distance to c) < -1\n"
+    query = Query(drawn.dataset, Source("p.scenic", text), QueryOptions())
+    assert not [each for each in query.results() if isinstance(each.verdict, Match)]
+    without = next(each for each in advice(query).outlooks if "distance" in each.change.told)
+    left = _found(drawn.dataset, f"{HEAD}require along(ego, c) > 3\n")
+    assert without.least == sum(1 for truth in left.values() if truth)
