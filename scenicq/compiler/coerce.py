@@ -16,7 +16,7 @@ from scenicq.errors import Span
 from scenicq.forest.angle_wrap import any_turn
 from scenicq.forest.build import compare, constant, vector
 from scenicq.forest.kinds import kind_of
-from scenicq.forest.nodes import CompareOp, Constant, Feature, Kind, Node, Select, Undefined
+from scenicq.forest.nodes import COURSE, CompareOp, Constant, Feature, Kind, Node, Select, Undefined
 from scenicq.geometry.elements import NetworkElement
 from scenicq.geometry.regions import Everywhere, Region
 from scenicq.syntax.hints import condition_hint
@@ -48,6 +48,7 @@ OBSERVABLE: dict[str, Kind] = {
     "velocity": "vector",
     "angularSpeed": "scalar",
     "acceleration": "scalar",
+    COURSE: "other",
 }
 """Properties that a label can observe, by kind: references to them are conditioned on the label."""
 

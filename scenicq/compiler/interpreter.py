@@ -47,6 +47,7 @@ from scenicq.errors import Diagnostic, ScenarioError, Span
 from scenicq.forest import build
 from scenicq.forest.nodes import Feature, Node
 from scenicq.forest.walk import postorder
+from scenicq.geometry.driven_courses import GAP_S
 from scenicq.geometry.network import Network
 from scenicq.geometry.regions import Everywhere
 from scenicq.syntax import ast
@@ -80,6 +81,7 @@ class Interpreter:
         initial: Whether dynamic parts are ignored rather than refused.
         imports: Runs an import or model statement; the environment takes the names.
         network: The road network.
+        gap_s: Seconds without a label at which the course of a track is cut.
         budget: What the program may still use.
         objects: The objects made so far.
         params: Global parameters: value, place, whether a library sets it.
@@ -94,6 +96,7 @@ class Interpreter:
     initial: bool
     imports: Callable[[ast.Import | ast.ImportFrom | ast.Model, Environment], None]
     network: Network
+    gap_s: float = GAP_S
     budget: Budget = field(default_factory=Budget)
     objects: list[Instance] = field(default_factory=list[Instance])
     requirements: list[RequireStatement] = field(default_factory=list[RequireStatement])

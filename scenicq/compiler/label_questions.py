@@ -11,6 +11,8 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from scenicq.compiler.other_objects import count, nearest, others
+from scenicq.compiler.random_values import is_choice
+from scenicq.compiler.road_courses import along, beside, corridor, course
 from scenicq.compiler.values import Builtin, ModelValue
 
 if TYPE_CHECKING:
@@ -21,7 +23,15 @@ __all__ = ["LABELS", "QUESTIONS", "question_names"]
 LABELS = "scenicq.labels"
 """What programs call the module."""
 
-QUESTIONS: Mapping[str, Callable[..., ModelValue]] = {"others": others, "count": count, "nearest": nearest}
+QUESTIONS: Mapping[str, Callable[..., ModelValue]] = {
+    "along": along,
+    "beside": beside,
+    "corridor": corridor,
+    "count": count,
+    "course": course,
+    "nearest": nearest,
+    "others": others,
+}
 """What each name of the module does: a function of the interpreter, the place of the call, and what it is given."""
 
 
@@ -31,4 +41,4 @@ def question_names(run: Interpreter) -> dict[str, ModelValue]:
     Args:
         run: The interpreter of the program that imports it.
     """
-    return {name: Builtin(name, partial(meaning, run)) for name, meaning in QUESTIONS.items()}
+    return {name: Builtin(name, partial(meaning, run), spread=is_choice) for name, meaning in QUESTIONS.items()}

@@ -27,8 +27,11 @@ from scenicq.compiler.values import Choice, Instance, ModelValue, fail, is_node
 from scenicq.compiler.version_detection import decide_version
 from scenicq.errors import Diagnostic, ScenarioError, Source, Span
 from scenicq.forest.compute import fold
-from scenicq.forest.nodes import Constant, Encloses, Intersects, Node, Undefined
+from scenicq.forest.course_ends import has_ends
+from scenicq.forest.nodes import COURSE, Constant, Encloses, Intersects, Node, Undefined
 from scenicq.forest.scenario import BuiltIn, Property, Requirement, Scenario, ScenarioObject
+from scenicq.forest.walk import postorder
+from scenicq.geometry.driven_courses import GAP_S
 from scenicq.geometry.elements import NetworkElement
 from scenicq.geometry.network import Network
 from scenicq.geometry.regions import Everywhere
@@ -50,6 +53,7 @@ def compile_scenario(
     loader: Loader | None = None,
     model: str | None = None,
     map_defaults: bool = True,
+    gap_s: float = GAP_S,
 ) -> Scenario:
     """Compile a program against a map.
 
@@ -64,6 +68,7 @@ def compile_scenario(
         model: The world model of a program that imports none, as Scenic's `--model`.
         map_defaults: Whether the world model's classes place and turn their objects as the map has it, where nothing
             else does. Without a map they never do, and the scenario's warnings say so.
+        gap_s: Seconds without a label at which the course of a track is cut.
 
     Raises:
         ScenarioError: The program is wrong or uses what is not supported.
@@ -73,7 +78,7 @@ def compile_scenario(
             timed = None if initial or behaviors is None else TimedStatements(behaviors)
             return _compiled(
                 source, network, version, initial=initial, timed=timed, loader=loader, model=model,
-                map_defaults=map_defaults,
+                map_defaults=map_defaults, gap_s=gap_s,
             )  # fmt: skip
     except Exhausted:
         what = f"evaluating the program takes more than {LIMITS.program_seconds:g} s"
@@ -91,12 +96,13 @@ def _compiled(
     loader: Loader | None,
     model: str | None,
     map_defaults: bool,
+    gap_s: float,
 ) -> Scenario:
     module = parse(source, version)
     chosen = decide_version(module)
     world = Modules(network, chosen, initial, loader, map_defaults=map_defaults and bool(network.features))
     run = world.interpreter
-    run.timed = timed
+    run.timed, run.gap_s = timed, gap_s
     try:
         library = None if world.is_model_named(module) else model or _left_out(module, chosen)
         names = {} if library is None else dict(world.load(library, _start(source)).names)
@@ -194,7 +200,10 @@ def _scenario(
     requirements += _built_in(run, ego)
     ego.label = "ego"
     names = _names(run.objects)
-    objects = tuple(_object(instance, names[number]) for number, instance in enumerate(run.objects))
+    on_courses = any(COURSE in instance.properties for instance in run.objects)
+    objects = tuple(
+        _object(instance, names[number], on_courses=on_courses) for number, instance in enumerate(run.objects)
+    )
     check_directions(objects, requirements)
     params = {
         name: Property(_at_the_end(partial(to_node, value, span), span), explicit=not library, span=span)
@@ -266,7 +275,14 @@ def _is_feature(value: ModelValue) -> bool:
     return is_node(value) or value is None or isinstance(value, str | int | float | bool | NetworkElement)
 
 
-def _object(instance: Instance, name: str) -> ScenarioObject:
+def _object(instance: Instance, name: str, *, on_courses: bool) -> ScenarioObject:
+    """An object as it is matched.
+
+    Args:
+        instance: The object.
+        name: What it is called.
+        on_courses: Whether the program asks for courses.
+    """
     properties: dict[str, Property] = {}
     uncomparable: dict[str, Span | None] = {}
     for key, value in instance.properties.items():
@@ -277,6 +293,11 @@ def _object(instance: Instance, name: str) -> ScenarioObject:
         if key in ("width", "length") and isinstance(node, Constant) and cast(float, node.value) <= 0:
             raise fail("wrong-value", f"the {key} of an object must be positive", span, "not positive")
         if node is not None:
+            asked = next((each for each in postorder((node,)) if has_ends(each)), None) if on_courses else None
+            if asked is not None:
+                raise fail("unsupported-construct", "`along` and `beside` ask what labels show: put them in `require`",
+                           asked.span or span, "not in a property",
+                           ("place the object with other words, and require this of it",))  # fmt: skip
             properties[key] = Property(node, key in instance.explicit, span)
         elif key in instance.explicit and value is not None:
             uncomparable[key] = span

@@ -34,7 +34,7 @@ from scenicq.forest.columns import (
     truth_of,
     value_reader,
 )
-from scenicq.forest.compute import CannotEvaluate, compute, directions
+from scenicq.forest.compute import FAR_M, CannotEvaluate, compute, directions
 from scenicq.forest.interpret import OnMap, RegionNode
 from scenicq.forest.kinds import as_kind
 from scenicq.forest.nodes import (
@@ -47,6 +47,7 @@ from scenicq.forest.nodes import (
     Constant,
     Contains,
     Coordinate,
+    CourseCoordinate,
     DirectionAt,
     DiscAt,
     Distance,
@@ -68,6 +69,7 @@ from scenicq.forest.nodes import (
 from scenicq.geometry.angles import azimuth_array, wrap_array
 from scenicq.geometry.boxes import box_polygons
 from scenicq.geometry.containment import covers_many
+from scenicq.geometry.driven_courses import CoursePlace, measured
 from scenicq.geometry.fields import VectorField
 from scenicq.geometry.membership import contains_many, distance_many
 from scenicq.geometry.regions import SLACK, PolygonSet, Region
@@ -268,6 +270,8 @@ class ColumnDomain:
         """What a region or vector field says of points or of other regions."""
         if isinstance(node, DirectionAt):
             return self._direction(node, args[0], args[1])
+        if isinstance(node, CourseCoordinate) and isinstance(args[0].data, Coded) and isinstance(args[1].data, tuple):
+            return self._course_coordinate(node, args[0].data, args)
         if isinstance(node, Contains | Distance) and isinstance(args[1].data, tuple):
             shape, point = args[0].data, args[1].data
             if isinstance(shape, Placed):
@@ -314,6 +318,19 @@ class ColumnDomain:
         if found is None:
             return Column(np.full(1, np.nan), places.status.reshape(places.shape))
         return Column(found.reshape(places.shape), places.status.reshape(places.shape))
+
+    def _course_coordinate(self, node: CourseCoordinate, courses: Coded, args: Sequence[Column]) -> Column:
+        places = ColumnPlaces((*args,))
+        self._check(len(places.defined), "courses")
+        which: list[int] = places.spread(courses.which)[places.defined].tolist()
+        mine = [cast(CoursePlace, courses.options[number]) for number in which]
+        found = measured(mine, places.points(args[1].data))
+        low, high = (found.end(node.axis, end) for end in (0, 1))
+        status, data = places.status.copy(), np.full(places.count, np.nan)
+        data[places.defined] = np.clip(high if node.end == 1 else low, -FAR_M, FAR_M)
+        if node.end is None:
+            status[places.defined[low != high]] = UNKNOWN
+        return Column(data.reshape(places.shape), status.reshape(places.shape))
 
     def _direction(self, node: DirectionAt, field: Column, point: Column) -> Column:
         places = ColumnPlaces((field, point))

@@ -23,11 +23,14 @@ from scenicq.forest.nodes import (
     Constant,
     Contains,
     Coordinate,
+    Corridor,
+    CourseCoordinate,
     DirectionAt,
     DiscAt,
     Distance,
     Encloses,
     Intersects,
+    LaneCourse,
     Logic,
     LogicOp,
     Node,
@@ -50,6 +53,7 @@ from scenicq.forest.walk import children, is_leaf
 from scenicq.geometry.angles import azimuth, rotate, wrap
 from scenicq.geometry.boxes import box_polygon
 from scenicq.geometry.containment import covers, overlaps
+from scenicq.geometry.driven_courses import CoursePlace, lane_course
 from scenicq.geometry.fields import VectorField
 from scenicq.geometry.membership import contains, distance
 from scenicq.geometry.regions import (
@@ -64,7 +68,11 @@ from scenicq.geometry.regions import (
 from scenicq.geometry.shapes import GeometryError
 from scenicq.geometry.terms import UndecidedError
 
-__all__ = ["CannotEvaluate", "compute", "directions", "fold"]
+__all__ = ["FAR_M", "CannotEvaluate", "compute", "directions", "fold"]
+
+
+FAR_M = 1e12
+"""Metres that stand for any greater distance along a course, with which can be reckoned."""
 
 
 class CannotEvaluate(Exception):
@@ -162,6 +170,16 @@ def _encloses(outer: Region, inner: Region) -> bool:
     if answer is None:
         raise CannotEvaluate(f"whether a {type(outer).__name__} holds a box")
     return answer
+
+
+def _course_coordinate(node: CourseCoordinate, course: CoursePlace, x: float, y: float) -> float:
+    low, high = course.ends(x, y)[2 * node.axis : 2 * node.axis + 2]
+    if node.end is not None:
+        return min(max(high if node.end else low, -FAR_M), FAR_M)
+    if low != high:
+        where = "of the course" if math.isfinite(low) and math.isfinite(high) else "beyond the end of the course"
+        raise CannotEvaluate(f"which place {where} it is at")
+    return low
 
 
 def directions(field: Value, point: Value) -> tuple[float, ...] | Undefined:
@@ -264,6 +282,14 @@ def _compute_region(node: Node, args: tuple[Value, ...]) -> Value:
             return contains(cast(Region, region), x, y)
         case Distance(), (region, (float() as x, float() as y)):
             return distance(cast(Region, region), x, y)
+        case CourseCoordinate(), (CoursePlace() as course, (float() as x, float() as y)):
+            return _course_coordinate(node, course, x, y)
+        case LaneCourse(), ((float() as x, float() as y), float() as heading):
+            return lane_course(node.network, x, y, heading)
+        case Corridor(), (CoursePlace() as course, float() as half_width):
+            if course.line is None:
+                raise CannotEvaluate("there is no course")
+            return course.line.within(half_width)
         case Intersects(), (left, right):
             return _intersects(cast(Region, left), cast(Region, right))
         case Encloses(), (outer, inner):

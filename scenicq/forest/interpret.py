@@ -19,6 +19,8 @@ from scenicq.forest.nodes import (
     Constant,
     Contains,
     Coordinate,
+    Corridor,
+    CourseCoordinate,
     DirectionAt,
     DiscAt,
     DiscreteRange,
@@ -27,6 +29,7 @@ from scenicq.forest.nodes import (
     Feature,
     Index,
     Intersects,
+    LaneCourse,
     Leaf,
     Logic,
     LogicOp,
@@ -54,9 +57,11 @@ __all__ = ["AbstractDomain", "OnMap", "RegionNode", "Steps", "interpret", "steps
 
 V = TypeVar("V")
 
-OnMap: TypeAlias = Distance | DirectionAt | Contains | Intersects | Encloses
-"""What is asked of regions and vector fields."""
-RegionNode: TypeAlias = DiscAt | SectorAt | RectangleAt | RegionUnion | RegionIntersection | RegionDifference
+OnMap: TypeAlias = Distance | DirectionAt | Contains | Intersects | Encloses | CourseCoordinate | LaneCourse
+"""What is asked of regions, vector fields and courses."""
+RegionNode: TypeAlias = (
+    DiscAt | SectorAt | RectangleAt | Corridor | RegionUnion | RegionIntersection | RegionDifference
+)  # fmt: skip
 Steps: TypeAlias = Sequence[tuple[Node, tuple[Node, ...]]]
 """Nodes with their children, which come before them."""
 
@@ -121,7 +126,7 @@ class AbstractDomain(Protocol[V]):
         ...
 
     def on_map(self, node: OnMap, args: Sequence[V]) -> V:
-        """What a region or vector field says of points or of other regions."""
+        """What a region, vector field or course says of points or of other regions."""
         ...
 
     def region(self, node: RegionNode, args: Sequence[V]) -> V:
@@ -188,9 +193,12 @@ def _value(node: Node, args: list[V], domain: AbstractDomain[V]) -> V:
             return domain.select(args[0], args[1:])
         case Range() | DiscreteRange() | Normal() | TruncatedNormal() | Index() | PointIn():
             return domain.variable(node, args)
-        case Distance() | DirectionAt() | Contains() | Intersects() | Encloses():
+        case Distance() | DirectionAt() | Contains() | Intersects() | Encloses() | CourseCoordinate() | LaneCourse():
             return domain.on_map(node, args)
-        case DiscAt() | SectorAt() | RectangleAt() | RegionUnion() | RegionIntersection() | RegionDifference():
+        case (
+            DiscAt() | SectorAt() | RectangleAt() | Corridor() | RegionUnion() | RegionIntersection()
+            | RegionDifference()
+        ):  # fmt: skip
             return domain.region(node, args)
         case Among():
             return domain.among(node, args)

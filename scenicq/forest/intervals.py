@@ -21,6 +21,8 @@ from scenicq.forest.nodes import (
     AmongOp,
     ArithmeticOp,
     CompareOp,
+    Corridor,
+    CourseCoordinate,
     DirectionAt,
     DiscAt,
     DiscreteRange,
@@ -28,6 +30,7 @@ from scenicq.forest.nodes import (
     Feature,
     Identity,
     Index,
+    LaneCourse,
     Leaf,
     LogicOp,
     PointIn,
@@ -248,6 +251,10 @@ class IntervalDomain(IntervalArithmetic[E]):
         match node:
             case DirectionAt():
                 return self.within(-math.pi, math.pi)
+            case CourseCoordinate():
+                return self.within(-math.inf, math.inf)
+            case LaneCourse():
+                return None
             case Distance():
                 region, point = map(self._pair, args)
                 return self._distance(region, point) if self.boxed else self.within(0.0, math.inf)
@@ -280,6 +287,8 @@ class IntervalDomain(IntervalArithmetic[E]):
                 return reduce(self._common, boxes)
             case RegionDifference():
                 return boxes[0]
+            case Corridor():
+                return self._pair(None)
             case DiscAt() | SectorAt():
                 reach = self.largest(self._scalar(args[1]))
             case RectangleAt():

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import cast
 
 from scenicq.forest.nodes import Among, Constant, Feature, Kind, Node, Select, Undefined, Value
+from scenicq.geometry.driven_courses import CoursePlace
 from scenicq.geometry.regions import Region
 
 __all__ = ["as_kind", "kind_of", "kind_of_value"]
@@ -18,7 +19,7 @@ def kind_of_value(value: Value) -> Kind:
         return "scalar"
     if isinstance(value, tuple):
         return "vector"
-    if value is None or isinstance(value, str | Undefined):
+    if value is None or isinstance(value, str | Undefined | CoursePlace):
         return "other"
     return "region" if isinstance(value, Region) else "field"
 

@@ -17,17 +17,18 @@ from enum import StrEnum
 from typing import ClassVar, Literal, TypeAlias
 
 from scenicq.errors import Span
+from scenicq.geometry.driven_courses import CoursePlace
 from scenicq.geometry.fields import VectorField
+from scenicq.geometry.network import Network
 from scenicq.geometry.regions import Region
 
 __all__ = [
-    "ELEMENT", "GIVEN", "IDENTITY", "MIRRORED", "RANK", "TRACK",
-    "Among", "AmongOp", "Arithmetic", "ArithmeticOp", "Bearing", "Body", "Compare", "CompareOp", "Constant",
-    "Contains", "Coordinate",
-    "DirectionAt", "DiscAt", "DiscreteRange", "Distance", "Encloses", "Feature", "Identity", "Index", "Intersects",
-    "Kind", "Leaf", "Logic", "LogicOp", "Node", "Norm", "Normal", "PointIn", "Range", "RectangleAt",
-    "RegionDifference", "RegionIntersection", "RegionUnion", "Rotate", "Scale", "SectorAt", "Select",
-    "TruncatedNormal", "Undefined", "Value", "Vector", "VectorOf", "VectorSum",
+    "COURSE", "ELEMENT", "GIVEN", "IDENTITY", "MIRRORED", "RANK", "TRACK",
+    "Among", "AmongOp", "Arithmetic", "ArithmeticOp", "Bearing", "Body", "Compare", "CompareOp", "Constant", "Contains",
+    "Coordinate", "Corridor", "CourseCoordinate", "DirectionAt", "DiscAt", "DiscreteRange", "Distance", "Encloses",
+    "Feature", "Identity", "Index", "Intersects", "Kind", "LaneCourse", "Leaf", "Logic", "LogicOp", "Node", "Norm",
+    "Normal", "PointIn", "Range", "RectangleAt", "RegionDifference", "RegionIntersection", "RegionUnion", "Rotate",
+    "Scale", "SectorAt", "Select", "TruncatedNormal", "Undefined", "Value", "Vector", "VectorOf", "VectorSum",
 ]  # fmt: skip
 
 Vector: TypeAlias = tuple[float, float]
@@ -45,7 +46,10 @@ class Undefined:
     reason: str
 
 
-Value: TypeAlias = float | bool | str | Vector | Region | VectorField | Undefined | None
+Value: TypeAlias = float | bool | str | Vector | Region | VectorField | CoursePlace | Undefined | None
+
+COURSE = "driven course"
+"""The property of an object that is its course; no program can give one of such a name."""
 
 
 class ArithmeticOp(StrEnum):
@@ -283,6 +287,39 @@ class DirectionAt(_Scalar):
     point: Node
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class CourseCoordinate(_Scalar):
+    """How far a point is along (axis 0) or beside (axis 1) an object's course.
+
+    Attributes:
+        end: The lower (0) or the upper (1) end of what it may be; None for the number itself, where both are equal.
+    """
+
+    course: Node
+    point: Node
+    axis: int
+    end: int | None = None
+
+
+# --- courses
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LaneCourse(_Node):
+    """The course of what is seen at one place alone: that of its lane.
+
+    Attributes:
+        network: The map.
+        gap_s: Seconds without a label at which the course of a track, which takes the place of this one, is cut.
+    """
+
+    value_kind: ClassVar[Kind] = "other"
+    point: Node
+    heading: Node
+    network: Network
+    gap_s: float
+
+
 # --- vectors
 
 
@@ -369,6 +406,14 @@ class RegionDifference(_Region):
 
     base: Node
     removed: Node
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Corridor(_Region):
+    """What lies within half a width of a course; the line itself where that is 0."""
+
+    course: Node
+    half_width: Node
 
 
 # --- booleans
@@ -480,6 +525,6 @@ class Among(_Node):
 Leaf: TypeAlias = Range | Normal | TruncatedNormal | DiscreteRange | Index | PointIn
 Node: TypeAlias = (
     Constant | Feature | Leaf | Select | Arithmetic | Coordinate | Norm | Bearing | Distance | DirectionAt |
-    VectorOf | VectorSum | Scale | Rotate | DiscAt | SectorAt | RectangleAt | RegionUnion | RegionIntersection |
-    RegionDifference | Compare | Logic | Contains | Intersects | Encloses | Among
+    CourseCoordinate | LaneCourse | VectorOf | VectorSum | Scale | Rotate | DiscAt | SectorAt | RectangleAt | Corridor |
+    RegionUnion | RegionIntersection | RegionDifference | Compare | Logic | Contains | Intersects | Encloses | Among
 )  # fmt: skip

@@ -14,6 +14,7 @@ from scenicq.forest.nodes import (
     Compare,
     Constant,
     Coordinate,
+    CourseCoordinate,
     DirectionAt,
     Feature,
     Identity,
@@ -85,6 +86,9 @@ def _show(
             return f"(not {args[0]})" if len(args) == 1 else "(" + f" {node.op.value} ".join(args) + ")"
         case Coordinate():
             return f"{args[0]}.{'xy'[node.axis]}"
+        case CourseCoordinate():
+            end = "" if node.end is None else (", at least", ", at most")[node.end]
+            return f"{('along', 'beside')[node.axis]}({', '.join(args)}{end})"
         case Select():
             return f"{args[0]} of [{', '.join(args[1:])}]"
         case Bearing() | DirectionAt():

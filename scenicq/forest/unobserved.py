@@ -3,6 +3,9 @@
 How an object moves (`MOTION`) is only ever observed, as no default of a class says it. A condition that reads what is
 not observed is replaced by two that do not: one that holds only where the condition surely does, one that holds
 wherever it may (Kleene's logic).
+
+How far something is along a course is known up to two ends, which mostly are equal (`CourseCoordinate`): a condition on
+it is one on the ends (`course_ends`).
 """
 
 from __future__ import annotations
@@ -12,6 +15,7 @@ from dataclasses import replace
 
 from scenicq.errors import Span
 from scenicq.forest import build
+from scenicq.forest.course_ends import Truths, connected, has_ends, joined, opposite, truths_by_ends
 from scenicq.forest.kinds import kind_of
 from scenicq.forest.nodes import (
     MIRRORED,
@@ -33,13 +37,10 @@ from scenicq.forest.value_numbers import ValueNumbers, is_total, without_negatio
 from scenicq.forest.walk import children, postorder, transform
 from scenicq.limits import LIMITS
 
-__all__ = ["MOTION", "Truths", "certain_and_possible", "with_any_value"]
+__all__ = ["MOTION", "certain_and_possible", "with_any_value"]
 
 MOTION = frozenset({"speed", "velocity", "acceleration", "angularSpeed"})
 """Properties that say how an object moves."""
-
-Truths = tuple[Node, Node]
-"""A condition that holds only where another surely holds, and one that holds wherever that may hold."""
 
 
 def certain_and_possible(root: Node, unobserved: Callable[[Feature | Among], bool]) -> Truths:
@@ -65,6 +66,8 @@ def with_any_value(root: Node, unobserved: Callable[[Feature], bool]) -> Node:
         return Normal(build.constant(0.0), build.constant(1.0))
 
     def step(node: Node) -> Node:
+        if has_ends(node):
+            return number()
         if not (isinstance(node, Feature) and unobserved(node)):
             return node
         made = VectorOf(number(), number()) if node.kind == "vector" else number()
@@ -83,8 +86,9 @@ class _Reader:
         self._known: dict[int, int] = {}
         self._alive: list[Node] = []  # as numbers are known by ids
 
-    def _hides(self, node: Node) -> bool:
-        return isinstance(node, Feature | Among) and self._unobserved(node)
+    def _is_open(self, node: Node) -> bool:
+        """Whether a node is no one value that is known."""
+        return (isinstance(node, Feature | Among) and self._unobserved(node)) or has_ends(node)
 
     def _number(self, node: Node) -> int:
         self._alive.append(node)
@@ -110,11 +114,11 @@ class _Reader:
 
             cases.append(self.apart(transform(root, given), splits - 1))
         (sure, may), (sure_not, may_not) = cases
-        either = _connected(LogicOp.AND, [
-            _connected(LogicOp.OR, [build.opposite(possible), sure]), _connected(LogicOp.OR, [certain, sure_not]),
+        either = connected(LogicOp.AND, [
+            connected(LogicOp.OR, [build.opposite(possible), sure]), connected(LogicOp.OR, [certain, sure_not]),
         ])  # fmt: skip
-        some = _connected(LogicOp.OR, [
-            _connected(LogicOp.AND, [possible, may]), _connected(LogicOp.AND, [build.opposite(certain), may_not]),
+        some = connected(LogicOp.OR, [
+            connected(LogicOp.AND, [possible, may]), connected(LogicOp.AND, [build.opposite(certain), may_not]),
         ])  # fmt: skip
         return either, some
 
@@ -124,9 +128,7 @@ class _Reader:
         seen: set[int] = set()
         for node in postorder((root,)):
             below = children(node)
-            if (isinstance(node, Feature | Among) and self._unobserved(node)) or any(
-                id(each) in reading for each in below
-            ):
+            if self._is_open(node) or any(id(each) in reading for each in below):
                 reading.add(id(node))
             if isinstance(node, Logic) and node.op is LogicOp.NOT:
                 continue  # it counts as what it negates, where it is asked for
@@ -168,9 +170,7 @@ class _Reader:
         found: dict[int, Truths] = {}
         for node in postorder((root,)):
             below = children(node)
-            if (isinstance(node, Feature | Among) and self._unobserved(node)) or any(
-                id(each) in reading for each in below
-            ):
+            if self._is_open(node) or any(id(each) in reading for each in below):
                 reading.add(id(node))
             if kind_of(node) == "boolean" or node is root:
                 reads = id(node) in reading
@@ -185,16 +185,16 @@ class _Reader:
             ):
                 return replace(node, unknown=False), replace(node, unknown=True)
             case Logic(op=LogicOp.NOT, args=(arg,)) if id(arg) in found:
-                return _opposite(found[id(arg)])
+                return opposite(found[id(arg)])
             case Logic() if node.op is not LogicOp.NOT and all(id(arg) in found for arg in node.args):
-                return _joined(node.op, *(found[id(arg)] for arg in node.args))
+                return joined(node.op, *(found[id(arg)] for arg in node.args))
             case Select() if all(id(option) in found for option in node.options):
                 return _chosen(node, found, index_known=id(node.index) not in reading)
             case Compare(op=CompareOp.EQ | CompareOp.NE) if kind_of(node.left) == kind_of(node.right) == "boolean":
                 one, other = found[id(node.left)], found[id(node.right)]
-                same = _joined(LogicOp.OR, _joined(LogicOp.AND, one, other),
-                               _joined(LogicOp.AND, _opposite(one), _opposite(other)))  # fmt: skip
-                return same if node.op is CompareOp.EQ else _opposite(same)
+                same = joined(LogicOp.OR, joined(LogicOp.AND, one, other),
+                               joined(LogicOp.AND, opposite(one), opposite(other)))  # fmt: skip
+                return same if node.op is CompareOp.EQ else opposite(same)
             case Compare(left=Arithmetic(op=ArithmeticOp.MIN | ArithmeticOp.MAX) as extreme):
                 return self._of_extreme(node.op, extreme, node.right, node.span, selects)
             case Compare(right=Arithmetic(op=ArithmeticOp.MIN | ArithmeticOp.MAX) as extreme):
@@ -208,18 +208,20 @@ class _Reader:
         """The same of `min(a, b) < c` and its like: one operand, or each, is beyond; `==` is both ways."""
         if op not in MIRRORED:
             sides = (self._of_extreme(each, extreme, bound, span, selects) for each in (CompareOp.LE, CompareOp.GE))
-            same = _joined(LogicOp.AND, *sides)
-            return same if op is CompareOp.EQ else _opposite(same)
+            same = joined(LogicOp.AND, *sides)
+            return same if op is CompareOp.EQ else opposite(same)
         least, below = extreme.op is ArithmeticOp.MIN, op in (CompareOp.LT, CompareOp.LE)
         parts = [self.truths(build.compare(op, arg, bound, span), selects) for arg in extreme.args]
-        return _joined(LogicOp.OR if least is below else LogicOp.AND, *parts)
+        return joined(LogicOp.OR if least is below else LogicOp.AND, *parts)
 
     def _atom(self, node: Node, reading: set[int], selects: int) -> Truths:
         """The same of a condition on values: what is the same for all outcomes of a choice inside is known."""
         inside = (each for each in postorder((node,)) if isinstance(each, Select) and each is not node)
         choice = next((each for each in inside if id(each) in reading), None)
         if choice is None or selects == 0:
-            return _of_speed(node, reading)
+            if any(isinstance(each, Feature) and self._unobserved(each) for each in postorder((node,))):
+                return _of_speed(node, reading)
+            return truths_by_ends(node)
         outcomes: list[Node] = []
         for number in range(len(choice.options)):
 
@@ -230,40 +232,18 @@ class _Reader:
         return self.truths(Select(choice.index, tuple(outcomes), span=node.span), selects - 1)
 
 
-def _opposite(truths: Truths) -> Truths:
-    certain, possible = truths
-    return build.opposite(possible), build.opposite(certain)
-
-
-def _is(node: Node, value: bool) -> bool:
-    return isinstance(node, Constant) and node.value is value
-
-
-def _joined(op: LogicOp, *args: Truths) -> Truths:
-    """`and` or `or`; what is known of the operands decides it where that is enough."""
-    return _connected(op, [certain for certain, _ in args]), _connected(op, [possible for _, possible in args])
-
-
-def _connected(op: LogicOp, args: list[Node]) -> Node:
-    decisive = op is LogicOp.OR
-    if any(_is(arg, decisive) for arg in args):
-        return build.constant(decisive)
-    left = [arg for arg in args if not _is(arg, not decisive)]
-    return build.logic(op, *left) if len(left) > 1 else left[0] if left else build.constant(not decisive)
-
-
 def _chosen(node: Select, found: dict[int, Truths], *, index_known: bool) -> Truths:
     """A choice between conditions; where its index is not known, what all its options agree on."""
     options = [found[id(option)] for option in node.options]
     if index_known:
         certain, possible = (tuple(option[place] for option in options) for place in (0, 1))
         return Select(node.index, certain, span=node.span), Select(node.index, possible, span=node.span)
-    every, some = _joined(LogicOp.AND, *options)[0], _joined(LogicOp.OR, *options)[1]
+    every, some = joined(LogicOp.AND, *options)[0], joined(LogicOp.OR, *options)[1]
     if id(node.index) not in found:
         return every, some
     index, (no, yes) = found[id(node.index)], options
-    chosen = _joined(LogicOp.OR, _joined(LogicOp.AND, index, yes), _joined(LogicOp.AND, _opposite(index), no))
-    return _joined(LogicOp.OR, chosen, (every, every))[0], chosen[1]
+    chosen = joined(LogicOp.OR, joined(LogicOp.AND, index, yes), joined(LogicOp.AND, opposite(index), no))
+    return joined(LogicOp.OR, chosen, (every, every))[0], chosen[1]
 
 
 def _of_speed(node: Node, reading: set[int]) -> Truths:

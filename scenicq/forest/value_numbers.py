@@ -17,9 +17,11 @@ from scenicq.forest.nodes import (
     CompareOp,
     Constant,
     Coordinate,
+    CourseCoordinate,
     DirectionAt,
     Feature,
     Intersects,
+    LaneCourse,
     Logic,
     LogicOp,
     Node,
@@ -91,6 +93,10 @@ class ValueNumbers:
                     below = sorted(below)
                 case Coordinate():
                     own = node.axis
+                case CourseCoordinate():
+                    own = node.axis, node.end
+                case LaneCourse():
+                    own = id(node.network), node.gap_s
                 case _ if is_leaf(node):
                     own = node.identity  # type: ignore[union-attr]
                 case _:

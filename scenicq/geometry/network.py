@@ -295,6 +295,10 @@ class Network:
         """The lane at a point."""
         return self._first(((self.lanes, "lane"),), x, y)
 
+    def lanesAt(self, x: float, y: float) -> list[Lane]:
+        """All lanes at a point, which overlap in intersections; in the map's order."""
+        return self._all(((self.lanes, "lane"),), x, y)
+
     def laneSectionAt(self, x: float, y: float) -> LaneSection | None:
         """The lane section at a point, one of the lane there."""
         lane = self.laneAt(x, y)

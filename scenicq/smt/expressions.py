@@ -12,6 +12,7 @@ from typing import cast
 
 from scenicq.forest.bounds import Box, scalar_bounds, vector_bounds
 from scenicq.forest.nodes import (
+    Among,
     Arithmetic,
     ArithmeticOp,
     Bearing,
@@ -19,6 +20,8 @@ from scenicq.forest.nodes import (
     Constant,
     Contains,
     Coordinate,
+    Corridor,
+    CourseCoordinate,
     DirectionAt,
     DiscAt,
     DiscreteRange,
@@ -28,6 +31,7 @@ from scenicq.forest.nodes import (
     Identity,
     Index,
     Intersects,
+    LaneCourse,
     Logic,
     Node,
     Norm,
@@ -170,6 +174,10 @@ class Expressions:
             case Bearing():
                 x, y = cast(TermVector, args[0])
                 return apply(Operator.ATAN2, apply(Operator.NEG, x), y)
+            case CourseCoordinate() | LaneCourse() | Corridor():
+                raise UnsupportedError("a course that hangs on what no label shows")
+            case Among():
+                raise UnsupportedError("a condition on other label objects that hangs on what no label shows")
             case DirectionAt():
                 return self._direction(node, cast(TermVector, args[1]))
             case Compare():

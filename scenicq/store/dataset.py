@@ -9,7 +9,8 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import closing, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,6 +27,7 @@ from scenicq.store.labels import Label
 from scenicq.store.manifest import Manifest, read_manifest
 from scenicq.store.place import LocalFolder, Place, StoreFile, find_place
 from scenicq.store.reader import read_labels
+from scenicq.store.recorded_tracks import RecordedTracks
 from scenicq.store.regions import read_features
 from scenicq.store.scans import allowed_paths, scan
 from scenicq.store.sql import sql_list
@@ -71,10 +73,17 @@ class Dataset:
     Attributes:
         place: Where its files are.
         manifest: What `dataset.json` says.
+        recorded: The tracks of its recordings.
     """
 
     place: Place
     manifest: Manifest
+    recorded: RecordedTracks = field(init=False, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Nothing of its tracks is read before it is asked for."""
+        # not of the dataset itself, which would live until somebody looks for circles
+        object.__setattr__(self, "recorded", RecordedTracks(partial(_files, self.place, self.manifest)))
 
     @property
     def name(self) -> str:
@@ -124,7 +133,7 @@ class Dataset:
 
     def files(self, table: str) -> tuple[StoreFile, ...]:
         """A table's Parquet files, in the order of their rows; absolute paths where they are on this machine."""
-        return tuple(map(self.place.file, self.manifest.tables[table]))
+        return _files(self.place, self.manifest, table)
 
     def scan(self, table: str, part: int | None = None, *, numbered: bool = False) -> str:
         """What SQL selects from to read a table; see `scans.scan`.
@@ -188,7 +197,7 @@ class Dataset:
         parts = list(zip(*(self.files(table) for table in ("labels", "objects", "sensors")), strict=True))
         with self.blamed():
             rows = None if wanted is None else find_rows(self.files("frame_index"), wanted)
-            yield from read_labels(parts, rows, wanted)
+            yield from read_labels(parts, rows, wanted, recorded=self.recorded)
 
     @contextmanager
     def blamed(self) -> Generator[None]:
@@ -258,7 +267,9 @@ class Dataset:
         """
         labels, objects, sensors = (self.files(table)[part] for table in ("labels", "objects", "sensors"))
         with self.blamed():
-            yield from read_labels([(labels, objects, sensors)], rows, None, motion=motion, space=False)
+            yield from read_labels(
+                [(labels, objects, sensors)], rows, None, motion=motion, space=False, recorded=self.recorded
+            )
 
     def verify(self) -> None:
         """Compare every file with its checksum.
@@ -274,6 +285,10 @@ class Dataset:
                 problems.append(Diagnostic("store-damaged", f"{part.path} has changed since it was written"))
         if problems:
             raise DataError(list(dict.fromkeys(problems)))
+
+
+def _files(place: Place, manifest: Manifest, table: str) -> tuple[StoreFile, ...]:
+    return tuple(map(place.file, manifest.tables[table]))
 
 
 def open_dataset(address: str | Path, *, older: bool = False, check: bool = True) -> Dataset:

@@ -7,8 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from scenicq.geometry.camera import Camera
+
+if TYPE_CHECKING:
+    from scenicq.store.recorded_tracks import RecordedTracks
 
 __all__ = ["Label", "LabelObject", "Motion", "OutOfPlane", "Recording"]
 
@@ -98,6 +102,8 @@ class Label:
         params: Global parameters (weather, time of day ...).
         sensors: Path of the sensor file of each channel, as the source gives it.
         cameras: Where the camera was and how it sees, of those channels for which the source says it.
+        recorded: What has the tracks of its recording; None for what was not read from a store. It is no part of the
+            label, and does not count where labels are compared.
     """
 
     frame: str
@@ -109,6 +115,7 @@ class Label:
     params: Mapping[str, str | float | bool] = field(default_factory=dict[str, str | float | bool])
     sensors: Mapping[str, str] = field(default_factory=dict[str, str])
     cameras: Mapping[str, Camera] = field(default_factory=dict[str, Camera])
+    recorded: RecordedTracks | None = field(default=None, compare=False, repr=False)
 
     @property
     def has_ego(self) -> bool:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from itertools import repeat
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
@@ -21,6 +21,9 @@ from scenicq.store.columns import OUT_OF_PLANE
 from scenicq.store.labels import Label, LabelObject, Motion, OutOfPlane
 from scenicq.store.place import StoreFile, open_parquet
 from scenicq.store.schema import ArrowTable
+
+if TYPE_CHECKING:
+    from scenicq.store.recorded_tracks import RecordedTracks
 
 __all__ = ["EGO_COLUMNS", "LABEL_COLUMNS", "MOTION_COLUMNS", "OBJECT_COLUMNS", "RowFile", "assemble", "read_labels"]
 
@@ -45,6 +48,7 @@ def read_labels(
     *,
     motion: bool = True,
     space: bool = True,
+    recorded: RecordedTracks | None = None,
 ) -> Iterator[Label]:
     """Labels in the order of the store.
 
@@ -54,6 +58,7 @@ def read_labels(
         wanted: Frames to yield; None for all that are looked at.
         motion: Whether what is computed of motion is read, too.
         space: Whether heights, tilts and cameras are read, too.
+        recorded: What labels name as that which has the tracks of their recordings.
     """
     more = [*(MOTION_COLUMNS if motion else []), *(OUT_OF_PLANE if space else [])]
     of_sensors = ["channel", "path", *(CAMERA_COLUMNS if space else [])]
@@ -84,7 +89,7 @@ def read_labels(
                             _members(object_rows, table, "object"),
                             _members(sensor_rows, table, "sensor"),
                         )
-                        yield from assemble(table, others, channels)
+                        yield from assemble(table, others, channels, recorded)
 
 
 def _members(rows: RowFile, frames: ArrowTable, what: str) -> ArrowTable:
@@ -141,7 +146,9 @@ class RowFile:
         return self._decoded[1]
 
 
-def assemble(frames: ArrowTable, objects: ArrowTable, sensors: ArrowTable) -> Iterator[Label]:
+def assemble(
+    frames: ArrowTable, objects: ArrowTable, sensors: ArrowTable, recorded: RecordedTracks | None = None
+) -> Iterator[Label]:
     """Labels from rows.
 
     Args:
@@ -149,6 +156,7 @@ def assemble(frames: ArrowTable, objects: ArrowTable, sensors: ArrowTable) -> It
         objects: `OBJECT_COLUMNS`, label by label; both may have `MOTION_COLUMNS` and `OUT_OF_PLANE`, too, and may lack
             columns of what nobody looks at.
         sensors: Channels and paths, label by label; it may have `CAMERA_COLUMNS`.
+        recorded: As of `read_labels`.
     """
     others = _objects([_values(objects, name) for name in OBJECT_COLUMNS], objects, "")
     egos = _objects([["ego"] * len(frames), *(_values(frames, name) for name in EGO_COLUMNS)], frames, "ego_")
@@ -164,7 +172,8 @@ def assemble(frames: ArrowTable, objects: ArrowTable, sensors: ArrowTable) -> It
         if seeing:
             pairs = zip(names, cameras[first_sensor:end], strict=True)
             known = {name: camera for name, camera in pairs if camera is not None}
-        yield Label(frame, recording, time, map_name, ego, tuple(others[first:stop]), params, files, known)
+        own = tuple(others[first:stop])
+        yield Label(frame, recording, time, map_name, ego, own, params, files, known, recorded)
         first, first_sensor = stop, end
 
 

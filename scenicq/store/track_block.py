@@ -7,6 +7,7 @@ No member at all is -1, which every column answers with nan, so that a column of
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -14,7 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scenicq.geometry.driven_courses import CoursePlace, lane_course
+from scenicq.geometry.network import Network
 from scenicq.store.dataset import Dataset
+from scenicq.store.recorded_tracks import RecordingCourses
 from scenicq.store.row_columns import RowColumns
 from scenicq.store.tracks import TrackKey
 
@@ -64,6 +68,7 @@ class TrackBlock:
         object_starts: Where the members that are objects of each label begin, and where the last one's end, shape
             (n + 1,).
         label_of: The label of each member, shape (m + n + 1,).
+        recorded: The tracks of the dataset's recordings.
         object_count: How many members are label objects.
         size: How many members there are: m label objects and n egos.
     """
@@ -81,6 +86,7 @@ class TrackBlock:
             rows: Rows of label objects in their part, in order, whose tracks are asked about; None for all tracks.
             reach: How much of these tracks is asked about; None for all of it.
         """
+        self.recorded = dataset.recorded
         self._labels = RowColumns(dataset.files("labels")[part], [f"ego_{name}" for name in _CODED])
         self._objects = RowColumns(dataset.files("objects")[part], [*_CODED, "track"])
         self.first_label, self._end = runs[0][0], runs[-1][1]
@@ -323,6 +329,34 @@ class TrackBlock:
         _, firsts, which = np.unique(self.tracks(members), return_index=True, return_inverse=True)
         known = [self.key(each) for each in members[firsts].tolist()]
         return [known[each] for each in which.tolist()]
+
+    def courses(self, members: Integers, network: Network, gap_s: float) -> list[CoursePlace | None]:
+        """The course of each member with where on it it is; None for nobody.
+
+        Args:
+            members: The members.
+            network: The map.
+            gap_s: Seconds without a label at which a course is cut.
+        """
+        found: list[CoursePlace | None] = [None] * len(members)
+        labels = self.label_of[members]
+        names: dict[int, RecordingCourses] = {}
+        for place in np.argsort(self.recording_of[np.maximum(labels, 0)], kind="stable").tolist():
+            if members[place] < 0:
+                continue
+            label = int(labels[place])
+            number = int(self.recording_of[label])
+            if number not in names:
+                names = {number: self.recorded.of(self.name(number))}
+            sample, member = label - self.runs[number][0], int(members[place])
+            track = self.key(member)
+            seen = None if track[0] == "object" else names[number].course(network, gap_s, track, sample)
+            found[place] = seen or lane_course(network, *self._place(member))
+        return found
+
+    def _place(self, member: int) -> tuple[float, float, float | None]:
+        x, y, heading = (float(self.numbers(name)[member]) for name in ("x", "y", "heading"))
+        return x, y, None if math.isnan(heading) else heading
 
     def _names(self) -> tuple[NDArray[np.int64], list[str]]:
         """By label object the number of its track's name, and the names."""

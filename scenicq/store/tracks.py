@@ -10,8 +10,11 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from scenicq.geometry.driven_courses import CoursePlace
+from scenicq.geometry.network import Network
 from scenicq.store.dataset import Dataset
 from scenicq.store.reader import MOTION_COLUMNS, RowFile
+from scenicq.store.recorded_tracks import RecordedTracks
 from scenicq.store.schema import ArrowTable
 
 __all__ = ["RecordingTracks", "TrackKey", "TrackReader"]
@@ -32,6 +35,7 @@ class RecordingTracks:
         frames: Names of its frames, in order of time.
         times_us: Their timestamps, shape (n,).
         labels, objects: Their rows of the tables.
+        recorded: What has the courses of tracks.
     """
 
     name: str
@@ -39,6 +43,7 @@ class RecordingTracks:
     times_us: NDArray[np.int64]
     labels: ArrowTable = field(repr=False)
     objects: ArrowTable = field(repr=False)
+    recorded: RecordedTracks = field(repr=False)
 
     def __post_init__(self) -> None:
         """Find the rows of each track."""
@@ -82,6 +87,22 @@ class RecordingTracks:
                 self._columns[key] = values
         return self._columns[key]
 
+    def course(self, track: TrackKey, sample: int, network: Network, gap_s: float) -> CoursePlace | None:
+        """The course of a track with where on it it is at a sample; None if it is not seen there.
+
+        Args:
+            track: The track.
+            sample: The sample.
+            network: The map.
+            gap_s: Seconds without a label at which a course is cut.
+        """
+        x, y, heading = (float(self.column(track, name)[sample]) for name in ("x", "y", "heading"))
+        if np.isnan(x):
+            return None
+        named = None if track[0] == "object" else track
+        place = x, y, None if np.isnan(heading) else heading
+        return self.recorded.course(network, gap_s, self.name, self.frames[sample], named, place)
+
     def attributes(self, track: TrackKey) -> list[Mapping[str, Any]]:
         """What the labels say beside the columns, at each sample; nothing where the track is not observed."""
         if track not in self._said:
@@ -105,6 +126,7 @@ class TrackReader:
             dataset: The dataset.
             part: Number of the part.
         """
+        self._recorded = dataset.recorded
         prefixed = [f"ego_{name}" for name in (*_NUMBERS, "attributes")]
         self._labels = RowFile(
             dataset.files("labels")[part],
@@ -136,6 +158,7 @@ class TrackReader:
             labels["timestamp_us"].to_numpy().astype(np.int64),
             labels,
             self._objects.take(np.arange(start, start + count)),
+            self._recorded,
         )
 
 

@@ -21,9 +21,10 @@ from scenicq.forest.column_domain import ColumnDomain, first_direction
 from scenicq.forest.columns import DEFINED, UNDEFINED, Coded, Column, arrays_of, column_of, constant_column, truth_of
 from scenicq.forest.columns import UNKNOWN as UNOBSERVED
 from scenicq.forest.condition import expand
+from scenicq.forest.course_ends import has_ends
 from scenicq.forest.ego_frame import DISTANCE, PLACE
 from scenicq.forest.interpret import OnMap, Steps, interpret, steps_of
-from scenicq.forest.nodes import Among, DirectionAt, Feature, Identity, Leaf, Node, Value
+from scenicq.forest.nodes import COURSE, Among, DirectionAt, Feature, Identity, LaneCourse, Leaf, Node, Value
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.temporal import Atom
 from scenicq.forest.unobserved import certain_and_possible
@@ -47,6 +48,10 @@ def reads_start(condition: Node) -> bool:
 
 def _is_speed(node: Node) -> bool:
     return isinstance(node, Feature) and node.property == "speed"
+
+
+def _is_none(_: Node) -> bool:
+    return False
 
 
 class UnclearVariable(Exception):
@@ -168,11 +173,16 @@ class AtomColumns:
         return read
 
     def _with_bounds(self, condition: Node, found: Truth) -> Truth:
-        """The truth where a condition is the same for every speed that is not observed."""
-        open_ = found == UNKNOWN
+        """The truth where a condition is the same for every speed that is not observed, and between ends of courses."""
         # between two cells a bound of a hidden number would be another one
-        if open_.any() and any(map(_is_speed, postorder((condition,)))) and not leaves(condition):
-            certain, possible = certain_and_possible(condition, _is_speed)
+        if not (found == UNKNOWN).any() or leaves(condition):
+            return found
+        nodes = list(postorder((condition,)))
+        # first as if all speeds were observed
+        unobserved: list[Callable[[Feature | Among], bool]] = [_is_none] if any(map(has_ends, nodes)) else []
+        for reads in [*unobserved, *([_is_speed] if any(map(_is_speed, nodes)) else [])]:
+            open_ = found == UNKNOWN
+            certain, possible = certain_and_possible(condition, reads)
             found[open_ & (self._truth(possible, {}, {}) == FALSE)] = FALSE
             found[open_ & (self._truth(certain, {}, {}) == TRUE)] = TRUE
         return found
@@ -356,6 +366,10 @@ class AtomColumns:
         if name in (PLACE, DISTANCE):
             assert isinstance(self.samples, BoundSamples)
             return self.samples.seen(self.scenario.ego, index, name)
+        if name == COURSE:
+            rules = self.scenario.objects[index].properties[COURSE].value
+            assert isinstance(rules, LaneCourse)
+            return self.samples.courses(index, rules)
         return self.samples.observed(index, name)
 
     def _feature(self, node: Feature) -> Column | None:

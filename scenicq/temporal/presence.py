@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.forest.groups import PARAMS
-from scenicq.forest.nodes import Node
+from scenicq.forest.nodes import COURSE, Node
 from scenicq.forest.walk import features
 from scenicq.temporal.samples import MOVING, BoundSamples
 
@@ -55,6 +55,8 @@ def observes(
 
 
 def _present(places: BoundSamples, index: int, name: str) -> NDArray[np.bool_]:
+    if name == COURSE:  # whoever is observed has one
+        return places.members[index] >= 0
     found = places.observed(index, name)
     if found is None:
         return np.zeros(len(places), np.bool_)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scenicq.forest.among import LabelElements
 from scenicq.forest.columns import DEFINED, UNKNOWN, Column, column_of
 from scenicq.forest.ego_frame import PLACE
-from scenicq.forest.nodes import IDENTITY, RANK, TRACK, Value
+from scenicq.forest.nodes import COURSE, IDENTITY, RANK, TRACK, LaneCourse, Value
 from scenicq.store.classes import Granularity, class_truth
 from scenicq.store.track_block import TrackBlock
 from scenicq.store.tracks import RecordingTracks, TrackKey
@@ -22,7 +22,7 @@ from scenicq.store.tracks import RecordingTracks, TrackKey
 __all__ = ["FIXED", "MOVING", "WITH_COLUMNS", "Binding", "BoundSamples", "Observed", "Samples"]
 
 _WHO = frozenset({IDENTITY, TRACK, RANK})
-MOVING = _WHO | {"position", "heading", "velocity", "speed", "angularSpeed", "acceleration"}
+MOVING = _WHO | {"position", "heading", "velocity", "speed", "angularSpeed", "acceleration", COURSE}
 """Properties that change from sample to sample: where they are not observed, nothing is known of them."""
 
 FIXED = frozenset({"width", "length", "height"})
@@ -56,6 +56,10 @@ class Observed(Protocol):
 
         A list with None where there is none, for what is no number; None if no sample has it.
         """
+        ...
+
+    def courses(self, index: int, rules: LaneCourse) -> list[Value]:
+        """The course of an object at each sample, with where on it it is; None where it is not observed."""
         ...
 
 
@@ -95,6 +99,10 @@ class BoundSamples:
             return [values[code] for code in codes[mine].tolist()]
 
         return _observed(name, lambda column: self.block.numbers(column)[mine], said)
+
+    def courses(self, index: int, rules: LaneCourse) -> list[Value]:
+        """See `Observed`."""
+        return [*self.block.courses(self.members[index], rules.network, rules.gap_s)]
 
     def seen(self, ego: int, index: int, name: str) -> tuple[Numbers, ...]:
         """`PLACE` or `DISTANCE` of an object, nan where it is not known.
@@ -204,6 +212,11 @@ class Samples:
             return [each.get(name) for each in self.tracks.attributes(track)[self.first : self.end]]
 
         return _observed(name, lambda column: self.tracks.column(track, column)[self.first : self.end], said)
+
+    def courses(self, index: int, rules: LaneCourse) -> list[Value]:
+        """See `Observed`."""
+        track = self.binding[index]
+        return [self.tracks.course(track, sample, rules.network, rules.gap_s) for sample in range(self.first, self.end)]
 
 
 def _observed(

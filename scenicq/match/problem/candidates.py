@@ -7,13 +7,13 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from scenicq.forest.among import LabelElements
-from scenicq.forest.nodes import Value
+from scenicq.forest.nodes import COURSE, Value
 from scenicq.forest.scenario import Scenario
 from scenicq.limits import LIMITS, exhausted
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.bipartite_matching import Slot, matchable
 from scenicq.match.problem.constraints import Signature
-from scenicq.match.problem.observation import observe, observe_params
+from scenicq.match.problem.observation import course_rules, observe, observe_course, observe_params
 from scenicq.match.verdict import Cause
 from scenicq.store.classes import Granularity, class_matches
 from scenicq.store.labels import Label
@@ -153,8 +153,13 @@ def find_candidates(
     disc = None if options.radius is None else ((label_objects[ego].x, label_objects[ego].y), options.radius)
     order = ranks(label, ego, candidates.values())
     candidates = {index: tuple(sorted(numbers, key=order.__getitem__)) for index, numbers in candidates.items()}
-    seen = tuple(map(observe, label_objects))
-    return LabelProblem(label, ego, seen, observe_params(label), candidates, order, disc, options.classes)
+    seen = [*map(observe, label_objects)]
+    for index, rules in course_rules(scenario).items():
+        for number in candidates.get(index, (ego,)):
+            course = observe_course(label, label_objects[number], rules)
+            if course is not None:
+                seen[number] = {**seen[number], COURSE: course}
+    return LabelProblem(label, ego, tuple(seen), observe_params(label), candidates, order, disc, options.classes)
 
 
 def candidates_of(

@@ -6,15 +6,16 @@ Depends on what label objects observe (their *signature*), not on their values, 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Container, Iterator, Mapping
+from collections.abc import Callable, Container, Mapping
 from dataclasses import replace
 
 from scenicq.forest import build
 from scenicq.forest.among import asks_others
 from scenicq.forest.collisions import apart, boxes
 from scenicq.forest.condition import expand
+from scenicq.forest.course_ends import has_ends
 from scenicq.forest.groups import PARAMS, Comparison, Condition, Constraint, Group, group_constraints
-from scenicq.forest.nodes import IDENTITY, RANK, TRACK, Among, Feature, Node
+from scenicq.forest.nodes import COURSE, IDENTITY, RANK, TRACK, Among, Feature, Node
 from scenicq.forest.scenario import BuiltIn, Requirement, Scenario, ScenarioObject
 from scenicq.forest.unobserved import MOTION, certain_and_possible, with_any_value
 from scenicq.forest.walk import features, postorder
@@ -117,8 +118,12 @@ def build_groups(scenario: Scenario, signature: Signature, options: MatchOptions
 
 
 def _with_doubts(group: Group, unobserved: Callable[[Feature | Among], bool]) -> Group:
-    """A group whose constraints read only what is observed; see `Group.certain`."""
-    doubtful = [item for item in group.constraints if any(map(unobserved, _read(item)))]
+    """A group whose constraints read only what is known; see `Group.certain`."""
+
+    def is_open(node: Node) -> bool:
+        return (isinstance(node, Feature | Among) and unobserved(node)) or has_ends(node)
+
+    doubtful = [item for item in group.constraints if any(map(is_open, postorder((item.expression,))))]
     if not doubtful:
         return group
     certain, possible = list[Constraint](), list[Constraint]()
@@ -138,12 +143,8 @@ def _with_doubts(group: Group, unobserved: Callable[[Feature | Among], bool]) ->
     return replace(group, constraints=tuple(possible), doubtful=tuple(doubtful), certain=tuple(certain))
 
 
-def _read(item: Constraint) -> Iterator[Feature]:
-    return (node for node in postorder((item.expression,)) if isinstance(node, Feature))
-
-
 def unobserved_motion(scenario: Scenario, seen: Mapping[int, Container[str]], constraint: Constraint) -> str:
-    """What of objects' motion a constraint reads and no label object observes, such as `ego.speed is not observed`.
+    """What a constraint reads and no label tells, such as `ego.speed is not observed`.
 
     Args:
         scenario: The scenario.
@@ -156,9 +157,12 @@ def unobserved_motion(scenario: Scenario, seen: Mapping[int, Container[str]], co
         for index, name in read
         if name in MOTION and index in seen and name not in seen[index]
     ]
-    if not names and asks_others(constraint.expression):
+    if names:
+        return f"{' and '.join(names)} {'is' if len(names) == 1 else 'are'} not observed"
+    if asks_others(constraint.expression):
         return "of other label objects not all that counts is observed"
-    return f"{' and '.join(names)} {'is' if len(names) == 1 else 'are'} not observed" if names else ""
+    on = {scenario.objects[index].name for index, name in read if name == COURSE}
+    return f"where on the course of {' and '.join(sorted(on))} it is, is not known" if on else ""
 
 
 def describe_constraint(scenario: Scenario, constraint: Constraint) -> str:

@@ -6,13 +6,16 @@ import math
 from collections.abc import Mapping
 from functools import lru_cache
 
-from scenicq.forest.nodes import Value
+from scenicq.forest.nodes import COURSE, LaneCourse, Value
+from scenicq.forest.scenario import Scenario
+from scenicq.geometry.driven_courses import CoursePlace
 from scenicq.store.labels import Label, LabelObject
+from scenicq.store.recorded_tracks import EGO
 
-__all__ = ["IN_COLUMNS", "observe", "observe_params", "observed_names"]
+__all__ = ["IN_COLUMNS", "course_rules", "observe", "observe_course", "observe_params", "observed_names"]
 
 IN_COLUMNS = frozenset({
-    "position", "heading", "width", "length", "height", "velocity", "speed", "acceleration", "angularSpeed",
+    "position", "heading", "width", "length", "height", "velocity", "speed", "acceleration", "angularSpeed", COURSE,
 })  # fmt: skip
 """What a label says in columns alone: an attribute of such a name is none of these."""
 
@@ -44,6 +47,21 @@ def observe(label_object: LabelObject) -> Mapping[str, Value]:
         if name not in IN_COLUMNS:
             seen[name] = value if isinstance(value, str | bool) else float(value)
     return seen
+
+
+def course_rules(scenario: Scenario) -> dict[int, LaneCourse]:
+    """For objects whose course a scenario asks for, the map and the gaps by which the courses of labels are made."""
+    given = {owner.index: owner.properties.get(COURSE) for owner in scenario.objects}
+    return {index: each.value for index, each in given.items() if each and isinstance(each.value, LaneCourse)}
+
+
+def observe_course(label: Label, label_object: LabelObject, rules: LaneCourse) -> CoursePlace | None:
+    """The course that a label object drives; None where nothing but the label itself is known."""
+    if label.recorded is None:
+        return None
+    track = EGO if label_object is label.ego else None if label_object.track is None else ("track", label_object.track)
+    place = (label_object.x, label_object.y, label_object.heading)
+    return label.recorded.course(rules.network, rules.gap_s, label.recording, label.frame, track, place)
 
 
 def observed_names(label_object: LabelObject) -> frozenset[str]:

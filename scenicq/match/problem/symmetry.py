@@ -17,9 +17,11 @@ from scenicq.forest.nodes import (
     Compare,
     Constant,
     Coordinate,
+    CourseCoordinate,
     Feature,
     Identity,
     Index,
+    LaneCourse,
     Logic,
     Node,
 )
@@ -70,6 +72,10 @@ def shape_of(group: Group, ego: int, tolerance: Tolerance) -> GroupShape:
             case Among():
                 # the body stands for itself: others that look alike are asked anew
                 own = (id(node.body), node.op, node.category, node.number, node.excluded)
+            case CourseCoordinate():
+                own = node.axis, node.end
+            case LaneCourse():
+                own = id(node.network), node.gap_s
             case _ if is_leaf(node):
                 number = leaves.setdefault(node.identity, len(leaves))  # type: ignore[union-attr]
                 own = (number, node.weights if isinstance(node, Index) else ())

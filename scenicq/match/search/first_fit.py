@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scenicq.budget import look
 from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.groups import Constraint
-from scenicq.forest.nodes import Identity, Leaf, Value
+from scenicq.forest.nodes import COURSE, Identity, LaneCourse, Leaf, Value
 from scenicq.forest.scenario import Scenario
 from scenicq.limits import LIMITS
 from scenicq.match.decide.closed_form import ClosedForm, Evaluated
@@ -30,7 +30,7 @@ from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import Candidates
 from scenicq.match.problem.constraints import Signature
 from scenicq.match.problem.map_lookups import MapLookups
-from scenicq.match.problem.observation import observe, observed_names
+from scenicq.match.problem.observation import observe, observe_course, observed_names
 from scenicq.match.problem.outcome import Outcome
 from scenicq.match.search.group_plan import GroupPlan, MatchPlan
 from scenicq.store.labels import Label, LabelObject
@@ -55,18 +55,24 @@ class LabelRow:
         label: The label.
         candidates: Who may play whom.
         seen: What is observed of its objects, by their numbers, as far as it was asked for.
+        courses: How courses are made, if the scenario asks for any.
     """
 
     number: int
     label: Label
     candidates: Candidates
     seen: dict[int, Mapping[str, Value]]
+    courses: LaneCourse | None = None
 
     def observed(self, number: int) -> Mapping[str, Value]:
         """What is observed of a label object; worked out when it is first asked for."""
         seen = self.seen.get(number)
         if seen is None:
-            seen = self.seen[number] = observe(_label_object(self.label, number))
+            mine = _label_object(self.label, number)
+            seen = self.seen[number] = observe(mine)
+            course = None if self.courses is None else observe_course(self.label, mine, self.courses)
+            if course is not None:
+                seen = self.seen[number] = {**seen, COURSE: course}
         return seen
 
 
@@ -439,12 +445,12 @@ def first_fit_of(plan: MatchPlan, scenario: Scenario) -> FirstFit | None:
 
 def signature_of(label: Label, ego: int, among: Candidates, relevant: tuple[frozenset[str], ...]) -> Signature | None:
     """What is observed of all candidates, if it is the same for all of a role."""
-    params, own = _texts(tuple(label.params)), observed_names(label.ego)
+    params, own = _texts(tuple(label.params)), _observed_of(label, label.ego)
     if len(relevant) == 1:
         return _signature(relevant, ego, own, own, params)
     objects = label.objects
     numbers = {number for index, numbers in among.items() if index != ego for number in numbers}
-    seen = {number: observed_names(objects[number - 1]) for number in numbers}
+    seen = {number: _observed_of(label, objects[number - 1]) for number in numbers}
     known = {_among(names, relevant) for names in {*seen.values()}}
     if len(known) == 1 and all(among[index] for index in range(len(relevant)) if index != ego):
         return _signature(relevant, ego, own, next(iter(known)), params)
@@ -458,6 +464,17 @@ def signature_of(label: Label, ego: int, among: Candidates, relevant: tuple[froz
             return None
         kinds.append(first)
     return (*kinds, params)
+
+
+def _observed_of(label: Label, label_object: LabelObject) -> frozenset[str]:
+    """What is observed of an object of a label; of what is recorded also its course."""
+    names = observed_names(label_object)
+    return names if label.recorded is None else _with_course(names)
+
+
+@functools.lru_cache(maxsize=4096)
+def _with_course(names: frozenset[str]) -> frozenset[str]:
+    return names | {COURSE}
 
 
 @functools.lru_cache(maxsize=4096)

@@ -9,6 +9,7 @@ from scenicq.forest.scenario import Scenario
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import Candidates, candidates_of, nearest_first
 from scenicq.match.problem.constraints import Signature, build_groups, relevant_properties
+from scenicq.match.problem.observation import course_rules
 from scenicq.match.problem.symmetry import interchangeable, shape_of
 from scenicq.match.search.first_fit import FirstFit, LabelRow, first_fit_of, signature_of
 from scenicq.match.search.group_plan import MatchPlan, make_plan
@@ -86,6 +87,7 @@ class PlanCache:
             given: Ids of label objects that are known to play objects, by the objects' names.
         """
         options = self.options
+        courses = next(iter(course_rules(self.scenario).values()), None)
         found: dict[FirstFit, list[LabelRow]] = {}
         if options.method != "auto" or options.exact or options.ego != "label":
             return found
@@ -97,7 +99,9 @@ class PlanCache:
                 signature = signature_of(label, self.scenario.ego, roles, self.relevant)
                 fit = None if signature is None else self._first_fit(self.plan(signature))
                 if fit is not None:
-                    found.setdefault(fit, []).append(LabelRow(number, label, nearest_first(label, 0, roles), {}))
+                    found.setdefault(fit, []).append(
+                        LabelRow(number, label, nearest_first(label, 0, roles), {}, courses)
+                    )
         return found
 
     def _first_fit(self, plan: MatchPlan) -> FirstFit | None:

@@ -198,8 +198,15 @@ class Decider:
     def _left(self, compiled: CompiledMap, among: NDArray[np.int64] | None = None) -> Iterator[Candidate]:
         """The labels that the prefilter has left, with as much of each as the matcher looks at."""
         motion, observed = compiled.motion, compiled.observed
+        recorded, whole = self.dataset.recorded, compiled.whole
         return candidates(
-            self.connection, compiled.plan, motion=motion, observed=observed, among=among, whole=compiled.whole
+            self.connection,
+            compiled.plan,
+            motion=motion,
+            observed=observed,
+            among=among,
+            recorded=recorded,
+            whole=whole,
         )
 
     def _recordings(self, compiled: CompiledMap, block: Block) -> Decided:
@@ -224,14 +231,20 @@ class Decider:
 
             def read(wanted: NDArray[np.int64]) -> Iterator[Candidate]:
                 keep_players(self.dataset, connection, plan, block, players)
-                return candidates(connection, plan, motion=compiled.motion, among=wanted, whole=compiled.whole)
+                return candidates(
+                    connection, plan, motion=compiled.motion, among=wanted, recorded=self.dataset.recorded,
+                    whole=compiled.whole,
+                )  # fmt: skip
         else:
             missed = run_prefilter(self.dataset, connection, plan, block)
             if plan.roles and (missed < 0).any():
                 rows = candidate_rows(connection, plan)
 
             def read(wanted: NDArray[np.int64]) -> Iterator[Candidate]:
-                return candidates(connection, plan, motion=compiled.motion, among=wanted, whole=compiled.whole)
+                return candidates(
+                    connection, plan, motion=compiled.motion, among=wanted, recorded=self.dataset.recorded,
+                    whole=compiled.whole,
+                )  # fmt: skip
 
         left = Survivors(every[missed < 0], rows, plan.roles or (), read)
         return Decided(missed, [], [], recordings.decide(block, left))

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from scenicq.forest.nodes import COURSE
 from scenicq.forest.scenario import Scenario
 from scenicq.limits import LIMITS
 from scenicq.match.explanation import Finding
@@ -200,7 +201,11 @@ def label_of(
             objects.append(_object(block, members[owner.index], names[owner.name], relevant[owner.index]))
     ego = _object(block, members[scenario.ego], "ego", relevant[scenario.ego])
     recording = int(block.recording_of[at])
-    return Label(f"{at}", f"{recording}", int(block.times_us[at]), map_name, ego, tuple(objects)), names
+    label = Label(f"{at}", f"{recording}", int(block.times_us[at]), map_name, ego, tuple(objects))
+    if any(COURSE in mine for mine in relevant):
+        # by these names the tracks are found that courses are made of
+        label = replace(label, frame=block.frame(at), recording=block.name(recording), recorded=block.recorded)
+    return label, names
 
 
 def _object(block: TrackBlock, member: int, id_: str, relevant: frozenset[str]) -> LabelObject:
@@ -214,10 +219,12 @@ def _object(block: TrackBlock, member: int, id_: str, relevant: frozenset[str]) 
     vx, vy = number(moves, "motion_vx"), number(moves, "motion_vy")
     velocity = None if vx is None or vy is None else (vx, vy)
     motion = Motion(velocity, number("acceleration"), number("angularSpeed", "yaw_rate"), derived=True)
+    kind, name = block.key(member) if COURSE in relevant else ("", "")
+    track = name if kind == "track" else None
     codes, classes = block.categories()
     said_codes, said = block.said()
     return LabelObject(
         id_, classes[int(codes[member])], "",
         float(block.numbers("x")[member]), float(block.numbers("y")[member]), number("heading"),
-        number("width"), number("length"), number("height"), None, None, said[int(said_codes[member])], motion,
+        number("width"), number("length"), number("height"), None, track, said[int(said_codes[member])], motion,
     )  # fmt: skip

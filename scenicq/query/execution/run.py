@@ -160,7 +160,7 @@ class Query:
             scenario = compile_scenario(
                 self.source, network, version=self.options.version, initial=self.options.initial,
                 behaviors=self.options.behaviors, loader=self.siblings,
-                model=self.options.model, map_defaults=self.options.map_defaults,
+                model=self.options.model, map_defaults=self.options.map_defaults, gap_s=self.options.time.gap_s,
             )  # fmt: skip
             check_enforced(scenario, self.options.match.enforce)
         except ScenarioError as error:

@@ -36,6 +36,7 @@ from scenicq.query.explain.prefilter_counts import spots
 from scenicq.query.prefilter.executor import hold, run_plan
 from scenicq.query.prefilter.survivors import candidates
 from scenicq.store.classes import ancestors, is_class
+from scenicq.store.recorded_tracks import RecordedTracks
 
 if TYPE_CHECKING:
     import duckdb
@@ -142,12 +143,14 @@ class _Sample:
         held: What holds the frames of each.
         frames: How many there are.
         total: How many the query has on all maps that the program fits: no change is about others.
+        recorded: The tracks of their recordings.
     """
 
     worlds: Mapping[str, CompiledMap]
     held: Mapping[str, duckdb.DuckDBPyConnection]
     frames: int
     total: int
+    recorded: RecordedTracks
 
 
 def advice(query: Query, *, budget_s: float = math.inf, brief: bool = False) -> Advice:
@@ -238,7 +241,7 @@ def _sample(query: Query, worlds: Mapping[str, CompiledMap], stack: ExitStack, r
         blocks = query.blocks(name)
         frames += hold(query.dataset, connection, list(spots(blocks, runs)) if total > LIMITS.advice_frames else blocks)
         held[name] = connection
-    return _Sample(chosen, held, frames, total)
+    return _Sample(chosen, held, frames, total, query.dataset.recorded)
 
 
 def _changes(scenario: Scenario, options: MatchOptions) -> Iterator[ProgramChange]:
@@ -328,7 +331,8 @@ def _outlook(options: MatchOptions, sample: _Sample, change: ProgramChange, solv
         if not count or looked_at >= most or time_is_up():
             continue
         matcher = Matcher(world.scenario, options, solver)
-        labels = islice(candidates(connection, world.plan, motion=world.motion, whole=world.whole), most - looked_at)
+        left_over = candidates(connection, world.plan, motion=world.motion, recorded=sample.recorded, whole=world.whole)
+        labels = islice(left_over, most - looked_at)
         for verdict in matcher.match_all([(each.label, each.among) for each in labels]):
             looked_at += 1
             matched += isinstance(verdict, Match)

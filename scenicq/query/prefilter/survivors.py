@@ -14,10 +14,12 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from scenicq.forest.nodes import COURSE
 from scenicq.match.problem.observation import IN_COLUMNS
 from scenicq.query.prefilter.plan import LABELS, OBJECTS, SENSORS, Plan
 from scenicq.store.labels import Label
 from scenicq.store.reader import LABEL_COLUMNS, MOTION_COLUMNS, OBJECT_COLUMNS, assemble
+from scenicq.store.recorded_tracks import RecordedTracks
 from scenicq.store.schema import ArrowTable
 
 if TYPE_CHECKING:
@@ -82,6 +84,7 @@ def candidates(
     observed: Collection[str] | None = None,
     among: NDArray[np.int64] | None = None,
     whole: bool = False,
+    recorded: RecordedTracks | None = None,
 ) -> Iterator[Candidate]:
     """The labels that are left of the block on which the prefilter was run last, in order.
 
@@ -92,6 +95,7 @@ def candidates(
         observed: Of label objects only class, position and these properties are read; None for all that is known.
         among: Rows of `labels`: only these; None for all.
         whole: Whether labels have all their objects, not only those that may play a role.
+        recorded: What labels name as that which has the tracks of their recordings.
     """
     left = f"(SELECT f FROM {plan.stages[-1].table} WHERE missed IS NULL)"
     if among is not None:
@@ -107,7 +111,7 @@ def candidates(
     sensors = _rows(connection, f"SELECT s.channel, s.path FROM {SENSORS} s {kept}")
     if plan.roles is None:
         objects = _rows(connection, f"SELECT {of_objects.replace('a.', 's.')} FROM {OBJECTS} s {mine}")
-        for label in _assembled(frames, objects, sensors):
+        for label in _assembled(frames, objects, sensors, recorded):
             yield Candidate(label, None)
         return
     if whole:
@@ -130,7 +134,7 @@ def candidates(
         (index, *_numbered(np.array(objects[f"r{place}"].to_pylist(), dtype=bool), ends))
         for place, index in enumerate(plan.roles)
     ]
-    for place, label in enumerate(_assembled(frames, objects, sensors)):
+    for place, label in enumerate(_assembled(frames, objects, sensors, recorded)):
         yield Candidate(label, {index: tuple(mine[cuts[place] : cuts[place + 1]]) for index, mine, cuts in may})
 
 
@@ -141,6 +145,8 @@ def _columns(observed: Collection[str] | None) -> list[str]:
     wanted = {"id", "class", "x", "y", *observed}
     if not wanted.isdisjoint(("velocity", "speed")):
         wanted.update(("vx", "vy"))
+    if COURSE in observed:
+        wanted.update(("track", "heading"))
     if not IN_COLUMNS.issuperset(observed):
         wanted.add("attributes")
     return [name for name in OBJECT_COLUMNS if name in wanted]
@@ -153,14 +159,16 @@ def _numbered(chosen: NDArray[np.bool_], ends: NDArray[np.int64]) -> tuple[list[
     return (rows - np.repeat(ends[:-1], np.diff(cuts)) + 1).tolist(), cuts.tolist()
 
 
-def _assembled(frames: ArrowTable, objects: ArrowTable, sensors: ArrowTable) -> Iterator[Label]:
+def _assembled(
+    frames: ArrowTable, objects: ArrowTable, sensors: ArrowTable, recorded: RecordedTracks | None
+) -> Iterator[Label]:
     """Labels, so many at a time that the size of a block does not matter."""
     ends = [np.concatenate(([0], np.cumsum(frames[f"{what}_count"].to_numpy()))) for what in ("object", "sensor")]
     for start in range(0, len(frames), _BATCH):
         stop = min(start + _BATCH, len(frames))
         mine, channels = (table.slice(rows[start], rows[stop] - rows[start])
                           for table, rows in zip((objects, sensors), ends, strict=True))  # fmt: skip
-        yield from assemble(frames.slice(start, stop - start), mine, channels)
+        yield from assemble(frames.slice(start, stop - start), mine, channels, recorded)
 
 
 def _rows(connection: duckdb.DuckDBPyConnection, sql: str) -> ArrowTable:

@@ -1,0 +1,557 @@
+"""The course of an object: the line through the centres of its track, and where others are along and beside it.
+
+Points under `MERGED_M` apart count as one, as boxes of what stands still jitter. Beyond its ends a course goes on along
+the centreline of the lane there and of those that it leads to (joining it within `JOIN_M`), and where there is none
+along the heading, for `BEYOND_M`, as if it were driven at `BEYOND_MPS`. The course of what is seen at one place alone
+is that of its lane, both ways.
+
+A place is measured from its *foot*, the nearest point of the course. A course may come by a place several times: it
+does so wherever it is at most `PASS_M` farther from it than at its nearest, and of these passes the one that is nearest
+in time to where the object itself is counts; of those that are so but for `SOON_S`, as where lanes part, the one that
+is nearest to the place. What is measured lies between two numbers, which are equal but where
+several feet are equally near (between their values), and beyond the end (at least what is left).
+
+Metres, seconds, radians. Ahead is where the object's box faces, left is positive.
+"""
+
+from __future__ import annotations
+
+import heapq
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+from shapely.geometry import LineString, MultiPolygon, Polygon
+
+from scenicq.geometry import shapes
+from scenicq.geometry.angles import direction
+from scenicq.geometry.elements import Lane
+from scenicq.geometry.network import Network
+from scenicq.geometry.regions import PolygonSet, PolylineSet, Region
+
+__all__ = ["BEYOND_M", "GAP_S", "CourseLine", "CoursePlace", "Measures", "lane_course", "measured", "track_courses"]
+
+Numbers = NDArray[np.float64]
+
+GAP_S = 1.5
+"""Seconds without a label at which a course is cut, if nothing else is said."""
+BEYOND_M = 50.0
+"""How far a course goes on beyond its ends."""
+BEYOND_MPS = 10.0
+"""How fast a course counts as driven beyond its ends."""
+MERGED_M = 0.5
+"""Points of a track that are nearer to each other than this count as one."""
+JOIN_M = 10.0
+"""Within so much of its end a course that goes on joins the centreline."""
+PASS_M = 3.5
+"""How much farther from a place than at its nearest a course may be to come by it."""
+ALONG_RAD = math.radians(60)
+"""How far the direction of a lane may be from a heading that it leads on."""
+_END = ""
+"""The name of the end of a course, from which others lead on."""
+_EQUAL_M = 1e-6
+"""Distances that differ by less are equal."""
+_ONE_M = 0.01
+"""Feet that are nearer to each other than this are one."""
+SOON_S = 1.0
+"""Passes of which one is nearer in time by less are equally near."""
+_JOINT_M = 1.0
+"""How far apart lanes may begin at a place for one to go on in the other."""
+_KNOWN = 4096
+"""Measures that are kept of a course."""
+
+
+@dataclass(frozen=True, slots=True)
+class Measures:
+    """How far places are along and beside a course: between two numbers each, shape (n,), infinite where unknown.
+
+    Attributes:
+        along: How far ahead, behind negative.
+        beside: How far to the left, right negative.
+        extended: Whether the course was not driven there, but goes on beyond its ends.
+    """
+
+    along: tuple[Numbers, Numbers]
+    beside: tuple[Numbers, Numbers]
+    extended: NDArray[np.bool_]
+
+    def end(self, axis: int, upper: int) -> Numbers:
+        """The lower (0) or upper (1) ends of what is measured along (axis 0) or beside (axis 1)."""
+        return (self.beside if axis else self.along)[upper]
+
+
+@dataclass(frozen=True, slots=True)
+class _Piece:
+    """A polyline of a course in its direction.
+
+    Attributes:
+        xy: Its points, shape (n, 2), n at least 2.
+        s: How far along the course the first is.
+        times: When each point was first and last passed, shape (n, 2); that of the end that it leads on from, beyond.
+        open_start, open_end: Whether the course is unknown before and behind it.
+        extended: Whether it was not driven.
+    """
+
+    xy: Numbers
+    s: float
+    times: Numbers
+    open_start: bool = False
+    open_end: bool = False
+    extended: bool = True
+
+
+class CourseLine:
+    """A course as a line, cut into segments.
+
+    Attributes:
+        pieces: What it is made of.
+        joints: Segments with which pieces end, each with one with which another goes on.
+        known: What has been measured from it.
+    """
+
+    def __init__(self, pieces: Sequence[_Piece], joints: Sequence[tuple[int, int]]) -> None:
+        """Take the pieces, and pairs of them of which the second goes on where the first ends."""
+        self.pieces = tuple(pieces)
+        firsts = np.cumsum([0, *(len(each.xy) - 1 for each in pieces)]).tolist()
+        self.joints = [(firsts[one + 1] - 1, firsts[other]) for one, other in joints]
+        self._corridors: dict[float, PolygonSet] = {}
+        self.known: dict[tuple[float, ...], tuple[float, float, float, float]] = {}
+        self.start = np.concatenate([each.xy[:-1] for each in pieces])
+        self.step = np.concatenate([np.diff(each.xy, axis=0) for each in pieces])
+        self.length = np.hypot(*self.step.T)
+        lengths = [np.hypot(*np.diff(each.xy, axis=0).T) for each in pieces]
+        self.s = np.concatenate(
+            [each.s + np.concatenate(([0.0], np.cumsum(mine)[:-1])) for each, mine in zip(pieces, lengths, strict=True)]
+        )
+        self.begins = np.concatenate([each.times[:-1] for each in pieces])
+        self.ends = np.concatenate([each.times[1:] for each in pieces])
+        self.linked = np.concatenate([np.arange(len(mine)) > 0 for mine in lengths])
+        sized = [(each, len(each.xy) - 1) for each in pieces]
+        self.open_start = np.concatenate([_at(0, size, each.open_start) for each, size in sized])
+        self.open_end = np.concatenate([_at(-1, size, each.open_end) for each, size in sized])
+        self.extended = np.concatenate([np.full(size, each.extended) for each, size in sized])
+
+    @cached_property
+    def region(self) -> PolylineSet:
+        """The line as a region."""
+        return PolylineSet(tuple(LineString(each.xy) for each in self.pieces), "the course")
+
+    def within(self, half_width: float) -> Region:
+        """What lies within so many metres of the line."""
+        if half_width == 0:
+            return self.region
+        if half_width not in self._corridors:
+            whole = shapes.union_all([shapes.round_band(each, half_width) for each in self.region.lines])
+            self._corridors[half_width] = PolygonSet((cast("Polygon | MultiPolygon", whole),), "the corridor")
+        return self._corridors[half_width]
+
+
+def _at(place: int, size: int, value: bool) -> NDArray[np.bool_]:
+    found = np.zeros(size, np.bool_)
+    found[place] = value
+    return found
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CoursePlace:
+    """The course of an object with where on it the object is at one time.
+
+    Attributes:
+        line: The course; None where nothing tells it.
+        s: How far along it the object is.
+        time_s: When.
+        sign: -1 where the box faces against the course, as while the object reverses; else 1.
+    """
+
+    line: CourseLine | None
+    s: float = 0.0
+    time_s: float = 0.0
+    sign: float = 1.0
+
+    def ends(self, x: float, y: float) -> tuple[float, float, float, float]:
+        """The ends between which a place is along and beside the course; the same question is answered once."""
+        if self.line is None:
+            return -math.inf, math.inf, -math.inf, math.inf
+        known, asked = self.line.known, (self.s, self.time_s, self.sign, x, y)
+        found = known.get(asked)
+        if found is None:
+            if len(known) >= _KNOWN:
+                known.clear()
+            measures = measured([self], np.array([[x, y]]))
+            low, high, right, left = (float(each[0]) for each in (*measures.along, *measures.beside))
+            found = known[asked] = low, high, right, left
+        return found
+
+
+NO_COURSE = CoursePlace(None)
+
+
+def measured(courses: Sequence[CoursePlace], xy: Numbers) -> Measures:
+    """How far places are along and beside courses, place by place.
+
+    Args:
+        courses: The course of each place.
+        xy: The places, shape (n, 2).
+    """
+    n = len(courses)
+    ends = np.tile(np.array([-np.inf, np.inf, -np.inf, np.inf]), (n, 1))
+    extended = np.zeros(n, np.bool_)
+    by_line: dict[int, list[int]] = {}
+    for number, each in enumerate(courses):
+        if each.line is not None:
+            by_line.setdefault(id(each.line), []).append(number)
+    for numbers in by_line.values():
+        line = cast(CourseLine, courses[numbers[0]].line)
+        room = max(1, 2_000_000 // len(line.s))
+        for first in range(0, len(numbers), room):
+            some = numbers[first : first + room]
+            own = np.array([(courses[each].s, courses[each].time_s, courses[each].sign) for each in some])
+            ends[some], extended[some] = _of_line(line, own, xy[some])
+    return Measures((ends[:, 0], ends[:, 1]), (ends[:, 2], ends[:, 3]), extended)
+
+
+def _of_line(line: CourseLine, own: Numbers, xy: Numbers) -> tuple[Numbers, NDArray[np.bool_]]:
+    """The ends of `along` and `beside` of places by one line, shape (n, 4), and which are beyond what was driven.
+
+    Args:
+        line: The line of m segments.
+        own: Where the object is, when, and which way it faces, shape (n, 3).
+        xy: The places, shape (n, 2).
+    """
+    n, m = len(xy), len(line.s)
+    to = xy[:, None, :] - line.start[None]  # (n, m, 2)
+    raw = (to * line.step).sum(axis=2) / line.length**2
+    part = np.clip(raw, 0.0, 1.0)
+    away = np.hypot(*np.moveaxis(to - part[:, :, None] * line.step, 2, 0))
+    side = line.step[:, 0] * to[:, :, 1] - line.step[:, 1] * to[:, :, 0]
+    reach = away.min(axis=1, keepdims=True) + PASS_M
+    active = away <= reach
+    from_start = np.hypot(to[:, :, 0], to[:, :, 1])
+    # a pass goes on from segment to segment where the corner between them is within reach, too
+    goes_on = np.zeros((n, m), np.bool_)
+    goes_on[:, 1:] = active[:, 1:] & active[:, :-1] & line.linked[1:] & (from_start[:, 1:] <= reach)
+    passes = np.cumsum(active & ~goes_on, axis=1) - 1 + (np.arange(n) * (m + 1))[:, None]
+    for end, start in line.joints:
+        together = active[:, end] & active[:, start] & (from_start[:, start] <= reach[:, 0])
+        for row in np.flatnonzero(together & (passes[:, end] != passes[:, start])).tolist():
+            passes[row, passes[row] == passes[row, start]] = passes[row, end]
+    least = np.full(n * (m + 1), np.inf)
+    np.minimum.at(least, passes[active], away[active])
+    near = active & (away <= np.where(active, least[np.maximum(passes, 0)], -np.inf) + _EQUAL_M)
+    late = _time_apart(line, part, own[:, 1:2])
+    soonest = np.where(near, late, np.inf).min(axis=1, keepdims=True)
+    timely = np.zeros(n * (m + 1), np.bool_)
+    timely[passes[near & (late <= soonest + SOON_S)]] = True
+    feet = near & timely[np.maximum(passes, 0)]
+    best = np.where(feet, away, np.inf).min(axis=1, keepdims=True)
+    feet &= away <= best + _EQUAL_M
+    sign = own[:, 2:3]
+    ahead = (line.s + part * line.length - own[:, 0:1]) * sign
+    left = np.copysign(away, side) * sign
+    beyond = feet & line.open_end & (raw > 1 + 1e-12)
+    before = feet & line.open_start & (raw < -1e-12)
+    forth, back = (beyond | before) & ((sign > 0) == beyond), (beyond | before) & ((sign > 0) == before)
+    low = np.where(back, -np.inf, ahead)
+    high = np.where(forth, np.inf, ahead)
+    outside = beyond | before
+    found = np.column_stack([
+        np.where(feet, low, np.inf).min(axis=1), np.where(feet, high, -np.inf).max(axis=1),
+        np.where(feet, np.where(outside, -np.inf, left), np.inf).min(axis=1),
+        np.where(feet, np.where(outside, np.inf, left), -np.inf).max(axis=1),
+    ])  # fmt: skip
+    # feet on both sides of a corner are one
+    for start in (0, 2):
+        same = found[:, start + 1] - found[:, start] <= _ONE_M
+        found[same, start + 1] = found[same, start]
+    return found, (feet & line.extended).any(axis=1)
+
+
+def _time_apart(line: CourseLine, part: Numbers, time: Numbers) -> Numbers:
+    """Seconds between a time and when the object was at points of segments, shape (n, m); 0 while it stood there."""
+    inside = line.begins[:, 1] + part * (line.ends[:, 0] - line.begins[:, 1])
+    low = np.where(part <= 0, line.begins[:, 0], np.where(part >= 1, line.ends[:, 0], inside))
+    high = np.where(part <= 0, line.begins[:, 1], np.where(part >= 1, line.ends[:, 1], inside))
+    return np.maximum(np.maximum(low - time, time - high), 0.0)
+
+
+def lane_course(network: Network, x: float, y: float, heading: float | None) -> CoursePlace:
+    """The course of what is seen at one place alone: that of its lane.
+
+    Args:
+        network: The map.
+        x: The place.
+        y: The place.
+        heading: Of the box; None if it is not known.
+    """
+    numbers = np.array([[x, y, math.nan if heading is None else heading]])
+    return track_courses(network, np.zeros(1), numbers, math.inf)[0]
+
+
+def track_courses(network: Network, times_s: Numbers, places: Numbers, gap_s: float) -> list[CoursePlace]:
+    """The course of an object at each sample of its track.
+
+    Args:
+        network: The map.
+        times_s: When the samples are, in order, shape (n,).
+        places: x, y and heading of each, the heading nan where it is not known, shape (n, 3).
+        gap_s: Between samples farther apart than this the course is cut.
+    """
+    if not len(times_s):
+        return []
+    cuts = np.flatnonzero(np.diff(times_s) > gap_s) + 1
+    found: list[CoursePlace] = []
+    for first, end in pairwise([0, *cuts.tolist(), len(times_s)]):
+        found += _stretch(network, times_s[first:end], places[first:end])
+    return found
+
+
+def _stretch(network: Network, times: Numbers, places: Numbers) -> list[CoursePlace]:
+    """The courses at the samples of a track without gaps."""
+    xy, headings = places[:, :2], places[:, 2]
+    firsts, which = _merged(xy)
+    corners = xy[firsts]
+    if len(firsts) == 1:
+        return _of_one_place(network, times, places)
+    lasts = np.append(np.array(firsts[1:]) - 1, len(xy) - 1)
+    steps = np.diff(corners, axis=0)
+    lengths = np.hypot(*steps.T)
+    starts = np.concatenate(([0.0], np.cumsum(lengths)))
+    own = _Piece(corners, 0.0, np.column_stack([times[firsts], times[lasts]]), extended=False)
+    ends = (
+        (corners[-1], steps[-1] / lengths[-1], float(headings[-1]), float(times[-1])),
+        (corners[0], -steps[0] / lengths[0], float(headings[0]), float(times[0])),
+    )
+    onwards = _onwards(network, *ends[0][:3], join=True)
+    back = _onwards(network, *ends[1][:3], join=True)
+    pieces = [own, *(_forward(each, float(starts[-1]), ends[0][3]) for each in onwards),
+              *(_backward(each, ends[1][3]) for each in back)]  # fmt: skip
+    ahead, behind = _links(onwards, 1), _links(back, 1 + len(onwards))
+    joints = [(0 if one is None else one, other) for one, other in ahead]
+    joints += [(other, 0 if one is None else one) for one, other in behind]
+    line = CourseLine(pieces, joints)
+    found: list[CoursePlace] = []
+    for number, corner in enumerate(which):
+        best: tuple[float, int, float] | None = None
+        for segment in (corner, corner - 1):  # of equals the one that it drives on
+            if 0 <= segment < len(steps):
+                to = xy[number] - corners[segment]
+                part = float(to @ steps[segment]) / lengths[segment] ** 2
+                low = -math.inf if segment == 0 else 0.0
+                high = math.inf if segment == len(steps) - 1 else 1.0
+                part = min(max(part, low), high)
+                away = float(np.hypot(*(to - part * steps[segment])))
+                if best is None or away < best[0] - _EQUAL_M:
+                    best = away, segment, part
+        assert best is not None
+        _, segment, part = best
+        faces = direction(float(headings[number]))
+        against = float(steps[segment] @ np.array(faces)) < 0
+        s = float(starts[segment] + part * lengths[segment])
+        found.append(CoursePlace(line, s, float(times[number]), -1.0 if against else 1.0))
+    return found
+
+
+def _merged(xy: Numbers) -> tuple[list[int], list[int]]:
+    """The samples with which points of a course begin, and by sample the number of its point."""
+    firsts, which = [0], [0]
+    for number in range(1, len(xy)):
+        if np.hypot(*(xy[number] - xy[firsts[-1]])) >= MERGED_M:
+            firsts.append(number)
+        which.append(len(firsts) - 1)
+    return firsts, which
+
+
+def _of_one_place(network: Network, times: Numbers, places: Numbers) -> list[CoursePlace]:
+    """The courses at the samples of what stands at one place."""
+    known = places[~np.isnan(places[:, 2])]
+    if not len(known):
+        return [NO_COURSE] * len(times)
+    corner, heading = places[0, :2], float(known[0, 2])
+    faces = np.array(direction(heading))
+    onwards = _onwards(network, corner, faces, heading, join=False)
+    back = _onwards(network, corner, -faces, heading, join=False)
+    pieces = [*(_forward(each, 0.0, float(times[-1])) for each in onwards),
+              *(_backward(each, float(times[0])) for each in back)]  # fmt: skip
+    ahead, behind = _links(onwards, 0), _links(back, len(onwards))
+    joints = [(one, other) for one, other in ahead if one is not None]
+    joints += [(other, one) for one, other in behind if one is not None]
+    firsts, lasts = ([other for one, other in links if one is None] for links in (ahead, behind))
+    joints += [(last, first) for last in lasts for first in firsts
+               if np.hypot(*(pieces[last].xy[-1] - pieces[first].xy[0])) <= _JOINT_M]  # fmt: skip
+    line = CourseLine(pieces, joints)
+    return [
+        CoursePlace(line, float((places[number, :2] - corner) @ faces), float(time))
+        for number, time in enumerate(times.tolist())
+    ]
+
+
+@dataclass(frozen=True, slots=True)
+class _Onward:
+    """A polyline that leads away from an end of a course.
+
+    Attributes:
+        xy: Its points, shape (n, 2).
+        far: How far from the end it begins.
+        is_last: Whether the course ends with it.
+        name: The lane that it follows.
+        after: The names of what it goes on from.
+    """
+
+    xy: Numbers
+    far: float
+    is_last: bool
+    name: str = ""
+    after: Sequence[str] = (_END,)
+
+
+def _links(onwards: Sequence[_Onward], first: int) -> list[tuple[int | None, int]]:
+    """Which of some polylines leads to which, by numbers from a first one on; None for the end of the course."""
+    number = {each.name: first + place for place, each in enumerate(onwards)}
+    return [
+        (None if name == _END else number[name], first + place)
+        for place, each in enumerate(onwards)
+        for name in each.after
+        if name == _END or name in number
+    ]
+
+
+def _forward(each: _Onward, s: float, time: float) -> _Piece:
+    when = time + (each.far + _lengths(each.xy)) / BEYOND_MPS
+    return _Piece(each.xy, s + each.far, np.column_stack([when, when]), open_end=each.is_last)
+
+
+def _backward(each: _Onward, time: float) -> _Piece:
+    lengths = _lengths(each.xy)
+    when = (time - (each.far + lengths) / BEYOND_MPS)[::-1]
+    s = -each.far - float(lengths[-1])
+    return _Piece(each.xy[::-1], s, np.column_stack([when, when]), open_start=each.is_last)
+
+
+def _lengths(line: Numbers) -> Numbers:
+    """How far along a polyline its points are."""
+    return np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))))
+
+
+def _onwards(network: Network, end: Numbers, outward: Numbers, heading: float, *, join: bool) -> list[_Onward]:
+    """How a course goes on beyond an end.
+
+    Args:
+        network: The map.
+        end: The end, shape (2,).
+        outward: The direction in which the course leaves it, of length 1.
+        heading: That of the box there; nan where it is not known.
+        join: Whether the course goes over from the end to the centreline; else it begins on it.
+    """
+    ways: list[bool] = []
+    faces = outward if math.isnan(heading) else np.array(direction(heading))
+    starts: list[tuple[Lane, Numbers, Numbers | None]] = []
+    for lane in network.lanesAt(float(end[0]), float(end[1])):
+        line = _centreline(lane)
+        if line is None:
+            continue
+        segment, part = _foot(line, end)
+        step = line[segment + 1] - line[segment]
+        if float(step @ faces) < math.cos(ALONG_RAD) * float(np.hypot(*step)):
+            continue
+        foot = line[segment] + part * step
+        forward = float(step @ outward) >= 0
+        rest = [foot, *line[segment + 1 :]] if forward else [foot, *line[segment::-1]]
+        starts.append((lane, _without_equals(np.array(rest)), end - foot if join else None))
+        ways.append(forward)
+    found = [each for way in (True, False) for each in _along_lanes(
+        [start for start, forward in zip(starts, ways, strict=True) if forward is way], forward=way
+    )]  # fmt: skip
+    if not found:
+        ahead = outward if float(faces @ outward) == 0 else faces * math.copysign(1.0, float(faces @ outward))
+        found = [_Onward(np.array([end, end + BEYOND_M * ahead]), 0.0, is_last=True)]
+    return found
+
+
+def _along_lanes(starts: Sequence[tuple[Lane, Numbers, Numbers | None]], *, forward: bool) -> list[_Onward]:
+    """The rests of lanes and the lanes that they lead to (or that lead to them), each once, by its nearest beginning.
+
+    Args:
+        starts: The lanes, with what is left of their centrelines and from how far beside these the course comes.
+        forward: Whether it goes on in the direction of travel.
+    """
+    found: list[_Onward] = []
+    begins = {lane.id: 0.0 for lane, _, _ in starts}
+    # the lanes that each is led to by; of starts the end itself
+    after: dict[str, list[str]] = {lane.id: [_END] for lane, _, _ in starts}
+    waiting = [(0.0, number, *start) for number, start in enumerate(starts)]
+    count = len(starts)
+    while waiting:
+        far, _, now, line, aside = heapq.heappop(waiting)
+        if far > begins[now.id]:
+            continue
+        own = _cut(line, BEYOND_M - far)
+        end = far + float(_lengths(line)[-1])
+        following = (now.successors if forward else now.predecessors) if end < BEYOND_M else ()
+        leads_on = False
+        for each in following:
+            others = _centreline(each)
+            if others is None:
+                continue
+            leads_on = True
+            after.setdefault(each.id, []).append(now.id if len(line) > 1 else _END)
+            if end < begins.get(each.id, math.inf):
+                begins[each.id] = end
+                count += 1
+                heapq.heappush(waiting, (end, count, each, others if forward else others[::-1], aside))
+        if end < BEYOND_M and not leads_on and len(line) > 1:
+            # the map ends here
+            last = line[-1] - line[-2]
+            own = np.vstack([line, line[-1] + (BEYOND_M - end) * last / np.hypot(*last)])
+        if len(own) > 1:
+            xy = own if aside is None else _joined(own, far, aside)
+            found.append(_Onward(xy, far, not leads_on, now.id, after[now.id]))
+    return found
+
+
+def _joined(line: Numbers, far: float, aside: Numbers) -> Numbers:
+    """A part of a course that comes from beside the centreline and joins it."""
+    if far >= JOIN_M:
+        return line
+    lengths = _lengths(line)
+    # between corners of the centreline it comes nearer evenly
+    at = np.union1d(lengths, [JOIN_M - far]) if JOIN_M - far < lengths[-1] else lengths
+    points = np.column_stack([np.interp(at, lengths, line[:, axis]) for axis in (0, 1)])
+    return _without_equals(points + np.maximum(0.0, 1.0 - (at + far) / JOIN_M)[:, None] * aside)
+
+
+def _cut(line: Numbers, length: float) -> Numbers:
+    """The beginning of a polyline."""
+    lengths = _lengths(line)
+    if lengths[-1] <= length:
+        return line
+    kept = int(np.searchsorted(lengths, length, side="left"))
+    end = [np.interp(length, lengths, line[:, axis]) for axis in (0, 1)]
+    return _without_equals(np.vstack([line[:kept], end]))
+
+
+def _centreline(lane: Lane) -> Numbers | None:
+    """The points of a lane's centreline in the direction of travel; None where the map gives none."""
+    if lane.centerline is None:
+        return None
+    points = np.vstack([shapes.coordinates(each) for each in lane.centerline.lines])
+    line = _without_equals(points)
+    return line if len(line) > 1 else None
+
+
+def _without_equals(line: Numbers) -> Numbers:
+    differs = np.append(True, np.hypot(*np.diff(line, axis=0).T) > 1e-9) if len(line) > 1 else np.ones(1, np.bool_)
+    return line[differs]
+
+
+def _foot(line: Numbers, place: Numbers) -> tuple[int, float]:
+    """The segment of a polyline that is nearest to a place, and where on it."""
+    steps = np.diff(line, axis=0)
+    to = place - line[:-1]
+    part = np.clip((to * steps).sum(axis=1) / (steps**2).sum(axis=1), 0.0, 1.0)
+    segment = int(np.argmin(np.hypot(*(to - part[:, None] * steps).T)))
+    return segment, float(part[segment])

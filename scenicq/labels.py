@@ -1,0 +1,160 @@
+"""`along`, `beside`, `course` and `corridor` where real Scenic runs a program: the module that Python finds.
+
+Scenicq itself reads `from scenicq.labels import ...` without running this. Scenic draws scenes of one instant, in which
+nothing has a track: a course is that of the lane, as of a label that is seen once
+(`scenicq.geometry.driven_courses`), so that drawn scenes match their program. Random arguments are sampled first, as
+those of Scenic's own functions are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from importlib import import_module
+from typing import Any, cast
+
+from scenicq.geometry.driven_courses import CoursePlace, lane_course
+from scenicq.geometry.network import Network
+from scenicq.geometry.regions import PolylineSet
+
+__all__ = ["along", "beside", "corridor", "course"]
+
+_MAP_SLACK_M = (1e-9, 0.05)
+
+
+def along(owner: Any, place: Any) -> Any:
+    """How far ahead of an object a place is on the course of the object.
+
+    Args:
+        owner: The object.
+        place: A point, object or vector.
+
+    Returns:
+        Metres, behind negative. Where the course does not tell, such as beyond its end, the scene is rejected.
+    """
+    return _sampled(_along)(owner, place)
+
+
+def beside(owner: Any, place: Any) -> Any:
+    """How far to the left of the course of an object a place is; arguments as of `along`.
+
+    Returns:
+        Metres, to the right negative.
+    """
+    return _sampled(_beside)(owner, place)
+
+
+def course(owner: Any) -> Any:
+    """The course of an object as one of Scenic's regions, a line."""
+    return _sampled(_course)(owner)
+
+
+def corridor(owner: Any, half_width: Any) -> Any:
+    """What lies within so many metres of the course of an object, as one of Scenic's regions."""
+    return _sampled(_corridor)(owner, half_width)
+
+
+def _along(owner: Any, place: Any) -> float:
+    low, high, _, _ = _place_of(owner).ends(*_xy(place))
+    return _known(low, high)
+
+
+def _beside(owner: Any, place: Any) -> float:
+    _, _, low, high = _place_of(owner).ends(*_xy(place))
+    return _known(low, high)
+
+
+def _known(low: float, high: float) -> float:
+    """A number that is known; what a label would leave open is no scene."""
+    if low != high:
+        raise import_module("scenic.core.distributions").RejectionException("the course does not tell where this is")
+    return low
+
+
+def _course(owner: Any) -> Any:
+    lines = [list(each.coords) for each in _line_of(owner).region.lines]
+    shapes = import_module("shapely.geometry")
+    return import_module("scenic.core.regions").PolylineRegion(polyline=shapes.MultiLineString(lines))
+
+
+def _corridor(owner: Any, half_width: float) -> Any:
+    polygons = _line_of(owner).within(float(half_width)).polygons
+    return import_module("scenic.core.regions").PolygonalRegion(polygon=polygons[0])
+
+
+def _line_of(owner: Any) -> Any:
+    line = _place_of(owner).line
+    if line is None:
+        raise import_module("scenic.core.distributions").RejectionException("there is no course")
+    return line
+
+
+def _sampled(function: Callable[..., Any]) -> Callable[..., Any]:
+    try:
+        distributions = import_module("scenic.core.distributions")
+    except ImportError:
+        message = (
+            "scenicq.labels is for programs that Scenic runs, which is not installed: scenicq reads them without it"
+        )
+        raise RuntimeError(message) from None
+    return distributions.distributionFunction(function)
+
+
+def _xy(place: Any) -> tuple[float, float]:
+    x, y, *_ = getattr(place, "position", place)
+    return float(x), float(y)
+
+
+def _place_of(owner: Any) -> CoursePlace:
+    x, y = _xy(owner)
+    lane = getattr(owner, "_lane", None)
+    return lane_course(cast(Network, _ScenicMap(lane)), x, y, float(owner.heading))
+
+
+@dataclass(eq=False)
+class _ScenicLane:
+    """One of Scenic's lanes as courses read them."""
+
+    lane: Any
+    network: Any
+
+    @property
+    def id(self) -> str:
+        return str(self.lane.uid)
+
+    @cached_property
+    def centerline(self) -> PolylineSet:
+        line = import_module("shapely.geometry").LineString([(x, y) for x, y, *_ in self.lane.centerline.points])
+        return PolylineSet((line,), "the middle of a lane")
+
+    @property
+    def successors(self) -> list[_ScenicLane]:
+        return [_ScenicLane(each, self.network) for each in _following(self.lane)]
+
+    @property
+    def predecessors(self) -> list[_ScenicLane]:
+        return [_ScenicLane(each, self.network) for each in self.network.lanes if self.lane in _following(each)]
+
+
+def _following(lane: Any) -> list[Any]:
+    ways = [each.connectingLane or each.endLane for each in lane.maneuvers]
+    after = getattr(lane, "_successor", None)
+    return list(dict.fromkeys([*ways, *([after] if type(after) is type(lane) else [])]))
+
+
+@dataclass(eq=False)
+class _ScenicMap:
+    """The map that one of Scenic's lanes lies in; where there is none, no lane is anywhere."""
+
+    lane: Any
+
+    def lanesAt(self, x: float, y: float) -> list[_ScenicLane]:  # noqa: N802 - as networks have it
+        if self.lane is None:
+            return []
+        network, here = self.lane.network, import_module("shapely.geometry").Point(x, y)
+        for slack in _MAP_SLACK_M:
+            near = [each for each in network.lanes if each.polygon.distance(here) <= slack]
+            if near:
+                return [_ScenicLane(each, network) for each in near]
+        return []
