@@ -134,6 +134,7 @@ def _scenario(each: ScenarioEvaluation) -> dict[str, Any]:
         "scenario": each.name,
         "matching_frames": each.matching,
         "other_frames": each.other,
+        "undecided_frames": each.undecided,
         "roles": [_comparison(role) for role in each.roles],
         "all_objects": _comparison(each.all_objects),
         "weighted": [_weighted(one) for one in each.weighted],
@@ -229,6 +230,13 @@ def overview(evaluation: Evaluation) -> Table:
             rows.append(row)
     more = ("SIMULATED", "RECORDINGS SAY") if simulated else ()
     return "scenarios", ("SCENARIO", *_COMPARED, *more), rows
+
+
+def frame_counts(scenario: ScenarioEvaluation) -> str:
+    """How many frames match, do not, and are undecided, in words."""
+    told = f"{scenario.matching:,} frames match, {scenario.other:,} do not"
+    undecided = scenario.undecided
+    return f"{told}, {undecided:,} {'is' if undecided == 1 else 'are'} undecided" if undecided else told
 
 
 def tables(scenario: ScenarioEvaluation, distance_m: float) -> list[Table]:

@@ -25,9 +25,11 @@ from scenicq.notebook.pictures import SCROLLS, DisplayedText, Picture, take_pict
 from scenicq.query.execution.lazy_solver import LazySolver
 from scenicq.query.execution.records import json_text, record
 from scenicq.query.execution.result_origin import name_origin
-from scenicq.query.execution.result_tables import result_schema, result_table
+from scenicq.query.execution.result_summary import ResultCount, ResultSummary
+from scenicq.query.execution.result_tables import result_schema, result_table, summary_metadata
 from scenicq.query.execution.results import Funnel, Result
 from scenicq.query.execution.run import Query
+from scenicq.query.execution.skipped_frames import summarize
 from scenicq.query.explain.frame_explanation import explain, show_explanation
 from scenicq.query.explain.interval_explanation import explain_recording
 from scenicq.report.backdrop import Backdrop
@@ -222,6 +224,14 @@ class Matches(Sequence[FrameResult]):
         return self.query.funnel
 
     @property
+    def summary(self) -> ResultSummary:
+        """What the results say of themselves: whether all frames were looked at, and how many are undecided."""
+        every, counted = self.query.options.all_matches, ResultCount()
+        for each in self._all():
+            counted.add(record(each.result, every=every))
+        return summarize(self.query, counted)
+
+    @property
     def warnings(self) -> tuple[DisplayedText, ...]:
         """What the author of the program should know: what cannot be meant, and what no label has to compare."""
         return tuple(DisplayedText(render(each)) for each in (*self.funnel.warnings, *lint_query(self.query)))
@@ -230,6 +240,7 @@ class Matches(Sequence[FrameResult]):
         """The results as an Arrow table with a field a role, as `-o FILE.parquet` has it."""
         every = self.query.options.all_matches
         schema = result_schema(self.query.roles(), origin=self.origin, over_time=self.query.is_over_time(), every=every)
+        schema = schema.with_metadata({**(schema.metadata or {}), **summary_metadata(self.summary)})
         return result_table((record(each.result, every=every) for each in self._all()), schema)
 
     def to_pandas(self) -> Any:
@@ -328,6 +339,8 @@ class Matches(Sequence[FrameResult]):
     def __repr__(self) -> str:
         """What was asked and, once known, how many results there are."""
         known = f"{len(self._found)} results" if self._rest is not None else "not yet looked for"
+        if self.query.funnel.limited is not None:
+            known += f", not complete: {self.summary.why_cut}"
         return f"<{self.query.source.name} on {self.query.dataset.name}: {known}>"
 
     def _repr_html_(self) -> str:
@@ -337,6 +350,7 @@ class Matches(Sequence[FrameResult]):
         rows = "".join(f"<tr>{_cells(each)}</tr>" for each in self._found[:_ROWS])
         more = f"<p>and {len(self._found) - _ROWS} more</p>" if len(self._found) > _ROWS else ""
         told = f"{funnel.matches} of {funnel.frames} frames match, {funnel.unknowns} unknown"
+        told += f"; not complete: {cut}" if (cut := self.summary.why_cut) else ""
         notes = "".join(f'<pre style="{SCROLLS}">{escape(text)}</pre>' for text in self.warnings)
         table = f'<div style="{SCROLLS}"><table><tr>{head}</tr>{rows}</table></div>'
         return f"<p>{told}</p>{notes}<div>{pictures}</div>{table}{more}"

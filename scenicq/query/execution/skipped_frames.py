@@ -1,0 +1,129 @@
+"""Which frames a query has not looked at, and the summary of its results."""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections.abc import Iterator
+from contextlib import closing
+
+from msgspec import UNSET, UnsetType
+
+from scenicq.query.execution.result_summary import End, ResultCount, ResultSummary, Stretch
+from scenicq.query.execution.results import Result
+from scenicq.query.execution.run import MAP_LACKS, Query
+
+__all__ = ["summarize"]
+
+_Run = tuple[str, str, int]
+"""A map, a recording, and how many frames it has there."""
+
+
+def summarize(query: Query, count: ResultCount) -> ResultSummary:
+    """What the results of a query say of themselves.
+
+    Args:
+        query: After its results were taken.
+        count: Of the results that are there.
+    """
+    funnel, options = query.funnel, query.options
+    skipped = tuple(_skipped(query)) if funnel.cut or funnel.limited is not None else ()
+    sample, unknown = funnel.sample, count.unknown
+    complete = not skipped
+    if sample is not None:
+        complete = complete and sample.shown >= sample.of and not sample.unknown
+        unknown = sample.unknown
+    return ResultSummary(
+        complete=complete,
+        results=count.results,
+        frames=sum(query.frames(name) for name in query.dataset.maps),
+        unknown=dict(sorted(unknown.items())),
+        all_matches=options.all_matches,
+        limit=options.limit or UNSET,
+        sample=UNSET if sample is None else sample.shown,
+        sampled_from=UNSET if sample is None else sample.of,
+        skipped=skipped,
+    )
+
+
+def _skipped(query: Query) -> Iterator[Stretch]:
+    """The frames behind the last one that the query has looked at, in the order of names and not of maps."""
+    why: End = "limit" if query.funnel.limited is not None else "deadline"
+    runs = list(_runs(query))
+    seen = _seen_until(query, query.funnel.limited, runs) if query.funnel.limited is not None else _seen(query)
+    left: dict[str, int] = {}
+    begun: tuple[_Run, int] | None = None
+    for run in runs:
+        _, recording, frames = run
+        if seen < frames:
+            left[recording] = left.get(recording, 0) + frames - max(seen, 0)
+            begun = (run, seen) if seen > 0 else begun
+        seen -= frames
+    names = sorted(query.dataset.manifest.by_recording)
+    for stretch in _consecutive(names, sorted(left), "" if begun is None else begun[0][1]):
+        time_us: int | UnsetType = UNSET
+        frame: str | UnsetType = UNSET
+        if begun is not None and stretch[0] == begun[0][1]:
+            time_us, frame = _frames(query, begun[0])[begun[1]]
+        frames = sum(left[name] for name in stretch)
+        yield Stretch(
+            why=why, frames=frames, first=stretch[0], last=stretch[-1], from_us=time_us, from_frame=frame
+        )  # fmt: skip
+
+
+def _runs(query: Query) -> Iterator[_Run]:
+    """The recordings in the order in which they are looked at; of a map that lacks what the program needs none is."""
+    fitting = {compiled.network.name for compiled in query.fitting()}
+    with closing(query.dataset.connect()) as connection:
+        rows = connection.execute("SELECT map, recording, count(*) FROM labels GROUP BY ALL").fetchall()
+    for name, recording, frames in sorted(rows):
+        chosen = None if query.recordings is None else query.recordings.get(name)
+        if name in fitting and (query.recordings is None or (chosen and chosen.first <= recording <= chosen.last)):
+            yield name, recording, frames
+
+
+def _frames(query: Query, run: _Run) -> list[tuple[int, str]]:
+    """The timestamp and name of each frame of a recording, in order."""
+    with closing(query.dataset.connect()) as connection:
+        return connection.execute(
+            "SELECT timestamp_us, frame FROM labels WHERE map = ? AND recording = ? ORDER BY ALL", run[:2]
+        ).fetchall()
+
+
+def _seen(query: Query) -> int:
+    """How many frames were looked at before the time was over; those of other maps are counted at once."""
+    lacking = sum(query.funnel.excluded[f"{MAP_LACKS}{name}"] for name in query.dataset.maps)
+    return query.funnel.frames - lacking
+
+
+def _seen_until(query: Query, last: Result, runs: list[_Run]) -> int:
+    """How many frames are before the end that a limit has put: there may be more of the last one's correspondences."""
+    before = 0
+    for run in runs:
+        if run[1] == last.recording:
+            if last.interval is not None:
+                return before  # other intervals of the recording may begin at the same time
+            frames, place = _frames(query, run), (last.timestamp_us, last.frame)
+            number = bisect_left(frames, place)
+            if number < len(frames) and frames[number] == place:
+                return before + number + (not query.options.all_matches)
+        before += run[2]
+    return before
+
+
+def _consecutive(names: list[str], left: list[str], begun: str) -> Iterator[list[str]]:
+    """Recordings of which frames are left, those together between whose names no other name lies.
+
+    Args:
+        names: Of all recordings, sorted.
+        left: Of those, sorted.
+        begun: The one of which frames were looked at: it comes first of those that are together.
+    """
+    number = {name: place for place, name in enumerate(names)}
+    together: list[str] = []
+    for name in left:
+        if together and (number[name] != number[together[-1]] + 1 or name == begun):
+            yield together
+            together = []
+        together.append(name)
+    if together:
+        yield together
