@@ -32,8 +32,8 @@ __all__ = ["report"]
 def report(before: Path, after: Path, *, every: bool, output: Path | None) -> None:
     """Say which matches came, went and stayed between two result files.
 
-    This shows what a changed line of a program did. With `match --all` the files also say why a frame does not match. What
-    one file leaves open (a frame that is unknown, or that --limit, --deadline or --sample left out) is undecided.
+    This shows what a changed line of a program did. With `match --all` the files also say why a frame does not match.
+    What one leaves open (a frame that is unknown, or that --limit, --deadline or --sample left out) is undecided.
     """
     old, new = read_results(before), read_results(after)
     doubt = check_datasets(old.records, new.records)
