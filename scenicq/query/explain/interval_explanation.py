@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from scenicq.errors import DataError, Diagnostic, render
 from scenicq.forest.scenario import Scenario
 from scenicq.limits import LIMITS
 from scenicq.match.matcher import Matcher
-from scenicq.match.verdict import Match, NoMatch
+from scenicq.match.verdict import Match, NoMatch, Unknown
 from scenicq.query.execution.interval_frames import locate
 from scenicq.query.execution.recording_matcher import CUT_OFF
 from scenicq.query.execution.recording_starts import DecidedStart, few_findings, start_table, starts_of
@@ -51,6 +51,7 @@ class IntervalExplanation:
         changes: What one number of the program would have to be for the interval to match.
         failed: What frames failed at that do not match the initial scene.
         example: One of the frames that failed at what the fewest did.
+        undecided: How many frames are unknown to match the initial scene, by the reason.
     """
 
     tracks: RecordingTracks
@@ -60,11 +61,14 @@ class IntervalExplanation:
     changes: tuple[str, ...] = ()
     failed: Counter[str] | None = None
     example: str = ""
+    undecided: Counter[str] = field(default_factory=Counter[str])
 
     @property
     def is_unknown(self) -> bool:
-        """Whether it may match."""
-        return self.interval is not None and self.interval.truth not in (TRUE, FALSE)
+        """Whether it may match: an interval is unknown, or it is unknown whether one begins at a frame."""
+        if self.matches:
+            return False
+        return bool(self.undecided) or (self.interval is not None and self.interval.truth != FALSE)
 
     @property
     def matches(self) -> bool:
@@ -78,8 +82,10 @@ class IntervalExplanation:
             counted = (self.failed or Counter()).most_common()
             rows = [f"  {count:>6,}  {what}" for what, count in counted]
             hint = [f"  = hint: `scenicq explain` with the frame {self.example} says how far that one is"]
+            if not counted:
+                return "\n".join([f"no frame of {tracks.name} surely matches the initial scene", *self._undecided()])
             head = f"no frame of {tracks.name} matches the initial scene; they fail at"
-            return "\n".join([head, *rows, *(hint if self.example else ())])
+            return "\n".join([head, *rows, *self._undecided(), *(hint if self.example else ())])
         first, last = float(tracks.seconds[interval.start]), float(tracks.seconds[interval.end])
         said = "matches" if interval.truth == TRUE else "does not match" if interval.truth == FALSE else "is unknown"
         if interval.reason:
@@ -92,8 +98,16 @@ class IntervalExplanation:
         if interval.cut_off:
             lines.append(f"cut off: the recording or a track ends at {last:.1f} s, before the program does")
             lines += [f"  = {each}" for each in self.changes if interval.broken is None]
+        lines += self._undecided() if not self.matches else ()
         lines += ["", *self._broken(interval)]
         return "\n".join([*lines, *show_bands(self.bands)]).rstrip()
+
+    def _undecided(self) -> list[str]:
+        """How many frames are unknown to match the initial scene."""
+        return [
+            f"  {count:>6,}  {'is' if count == 1 else 'are'} unknown: {reason}"
+            for reason, count in self.undecided.most_common()
+        ]
 
     def _broken(self, interval: IntervalVerdict) -> list[str]:
         """The requirement that is broken, where, when, and by how much."""
@@ -176,6 +190,7 @@ def explain_recording(query: Query, solver: Solver, name: str, begins: int | flo
     matchers = start_matchers(Matcher(scenario, query.options.match, solver), intervals.outcomes)
     time_us = None if begins is None else _frame_time(tracks, begins)
     failed: Counter[str] = Counter()
+    undecided: Counter[str] = Counter()
     examples: dict[str, str] = {}
     with TrackBlock(query.dataset, part, [(first, end)]) as block:
         starts: list[_Start] = []
@@ -188,13 +203,16 @@ def explain_recording(query: Query, solver: Solver, name: str, begins: int | flo
                 *range(*block.object_starts[sample : sample + 2].tolist()),
             ]
             causes: list[str] = []
+            unknown: list[str] = []
             before = len(starts)
             for outcome, matcher in enumerate(matchers):
                 findings = few_findings(matcher, label, known)
-                found = starts_of(scenario, block, label, members, findings)
+                found = [*starts_of(scenario, block, label, members, findings)]
                 starts += [(each, outcome) for each in found if isinstance(each, DecidedStart)]
+                unknown = [each.reason for each in found if isinstance(each, Unknown)] or unknown
                 causes += [each.verdict.cause.what for each in findings if not isinstance(each.verdict, Match)]
-            if len(starts) == before:
+            undecided.update(unknown[:1])
+            if len(starts) == before and not unknown:
                 what = causes[0] if causes else "tracks"
                 failed[what] += 1
                 examples.setdefault(what, label.frame)
@@ -209,11 +227,13 @@ def explain_recording(query: Query, solver: Solver, name: str, begins: int | flo
             results = _intervals(intervals, scenario, block, whole)
     if not results:
         rarest = min(failed, key=lambda what: failed[what], default="")
-        return IntervalExplanation(tracks, None, failed=failed, example=examples.get(rarest, ""))
+        example = examples.get(rarest, "")
+        return IntervalExplanation(tracks, None, failed=failed, example=example, undecided=undecided)
     best = max(results, key=lambda each: (each.truth, each.cut_off, each.end - each.start))
     roles = tuple((scenario.objects[index].name, track[1] or "ego") for index, track in best.binding)
     changes = tuple(change.text() for change in changes_of(scenario, tracks, best))
-    return IntervalExplanation(tracks, best, roles, bands_of(scenario, tracks, best), changes)
+    bands = bands_of(scenario, tracks, best)
+    return IntervalExplanation(tracks, best, roles, bands, changes, undecided=undecided)
 
 
 def changes_of(
