@@ -32,9 +32,10 @@ from scenicq.option_values import MARGIN_OPTION, SCORE, SEED, OneOf, read_option
 from scenicq.query.execution.records import FrameRecord, IntervalRecord, Record, SummaryRecord, record, record_of
 from scenicq.query.execution.result_files import RecordStream, read_records
 from scenicq.query.execution.result_origin import check_origins, name_origin
-from scenicq.query.execution.result_summary import Completeness
+from scenicq.query.execution.result_summary import Completeness, ResultCount
 from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query
+from scenicq.query.execution.skipped_frames import summarize
 from scenicq.store.dataset import Dataset
 
 __all__ = ["Evaluation", "ScenarioEvaluation", "WorstFrame", "evaluate"]
@@ -236,8 +237,10 @@ def _records(results: Results, doubts: list[Diagnostic]) -> Iterator[Record | Su
     if isinstance(results, Query):
         options = replace(results.options, all_matches=True, proofs=True, every=False, limit=None)
         query = Query(results.dataset, results.source, options, files=results.files)
-        yield from (record(each, every=True) for each in query.results())
+        counted = ResultCount()
+        yield from counted.counted(record(each, every=True) for each in query.results())
         doubts += query.funnel.warnings
+        yield SummaryRecord(summarize(query, counted))
         return
     if isinstance(results, Path | str):
         yield from read_records(Path(results)).records

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -52,6 +52,7 @@ class Matched:
         log_weight: How much each frame counts where frames are to be spread as the program spreads its scenes, nan
             where the results do not say, shape (frames,); None where they say it of none.
         every: Whether the results say every correspondence of each frame that matches.
+        variables: What the program says at the place of each random variable, as far as the results say it.
     """
 
     name: str
@@ -62,6 +63,7 @@ class Matched:
     witness: Mapping[int, Mapping[str, Any]]
     log_weight: NDArray[np.float64] | None = None
     every: bool = True
+    variables: Mapping[str, str] = field(default_factory=dict[str, str])
 
     @property
     def free(self) -> Bools:
@@ -123,8 +125,11 @@ def read_matched(
                     played.setdefault(role, {})[here[its]] = None
                 elif of_frame:
                     raise _lacking(name, f"`{its}` in frame {frames.names[frame]}")
+    variables: Mapping[str, str] = {}
     if completeness is not None:
-        _mark_silent(unknown, frames, completeness())
+        said = completeness()
+        _mark_silent(unknown, frames, said)
+        variables = {} if said.summary is None else said.summary.variables
     return Matched(
         name=name,
         matching=matching,
@@ -134,6 +139,7 @@ def read_matched(
         witness=witness,
         log_weight=log_weight if ranked else None,
         every=every,
+        variables=variables,
     )
 
 
@@ -145,7 +151,7 @@ def _mark_silent(unknown: Bools, frames: Frames, said: Completeness) -> None:
         frames: The dataset's.
         said: What it means that a frame is not named.
     """
-    if said.whole:
+    if said.whole or said.summary is None:
         return
     times_us: list[int] = frames.timestamp_us.tolist()
     recordings: list[int] = frames.recording.tolist()

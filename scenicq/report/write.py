@@ -18,10 +18,10 @@ from scenicq.query.execution.result_summary import ResultCount
 from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query
 from scenicq.query.execution.skipped_frames import summarize
+from scenicq.query.execution.variable_texts import variable_texts
 from scenicq.query.explain.frame_explanation import explain, explain_match
 from scenicq.report.backdrop import Backdrop
 from scenicq.report.cards import TILE_LETTERS, Card, best_frame, draw_card, draw_tile
-from scenicq.report.frames import variable_texts
 from scenicq.report.overview import funnel_section, how_section, program_section
 from scenicq.report.page import GENERATOR, page, runs_section
 from scenicq.report.picture import LETTERS, Shot, draw

@@ -63,6 +63,7 @@ class ResultSummary(Struct, frozen=True, omit_defaults=True, kw_only=True):
         sample: How many matches were drawn, where not all were wanted.
         sampled_from: Of how many.
         skipped: Frames that nobody has looked at.
+        variables: What the program says at the place of each random variable of its author's, for readers of witnesses.
     """
 
     complete: bool
@@ -74,6 +75,7 @@ class ResultSummary(Struct, frozen=True, omit_defaults=True, kw_only=True):
     sample: int | UnsetType = UNSET
     sampled_from: int | UnsetType = UNSET
     skipped: tuple[Stretch, ...] = ()
+    variables: dict[str, str] = {}
 
     @property
     def why_cut(self) -> str:
@@ -108,6 +110,7 @@ def join_summaries(parts: Sequence[ResultSummary]) -> ResultSummary | None:
         sample=sum(each.sample or 0 for each in sampled) if sampled else UNSET,
         sampled_from=sum(each.sampled_from or 0 for each in sampled) if sampled else UNSET,
         skipped=tuple(stretch for each in parts for stretch in each.skipped),
+        variables={place: text for each in parts for place, text in each.variables.items()},
     )
 
 

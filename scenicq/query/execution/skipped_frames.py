@@ -11,6 +11,7 @@ from msgspec import UNSET, UnsetType
 from scenicq.query.execution.result_summary import End, ResultCount, ResultSummary, Stretch
 from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import MAP_LACKS, Query
+from scenicq.query.execution.variable_texts import variable_texts
 
 __all__ = ["summarize"]
 
@@ -42,7 +43,16 @@ def summarize(query: Query, count: ResultCount) -> ResultSummary:
         sample=UNSET if sample is None else sample.shown,
         sampled_from=UNSET if sample is None else sample.of,
         skipped=skipped,
+        variables=_variables(query) if count.results else {},
     )
+
+
+def _variables(query: Query) -> dict[str, str]:
+    """The texts of the random variables that are the author's own, and not those of a library."""
+    compiled = next(query.fitting(), None)
+    texts = {} if compiled is None else variable_texts(compiled.scenario)
+    own = f"{query.source.file_name}:"
+    return {place: texts[place] for place in sorted(texts) if place.startswith(own) or not place.startswith("<")}
 
 
 def _skipped(query: Query) -> Iterator[Stretch]:

@@ -379,7 +379,10 @@ def test_results_that_say_nothing_of_themselves_are_read_with_a_word(run: Any, p
     file.write_text("\n".join([*lines[:-1], json.dumps(last)]) + "\n")
     old = run("evaluate", file, *words)
     assert "results-incomplete" in old.stderr
-    assert json.loads(old.stdout)["scenarios"] == json.loads(whole.stdout)["scenarios"]
+    (mine,), (other,) = (json.loads(each.stdout)["scenarios"] for each in (old, whole))
+    for each in other["slices"]:
+        each.pop("source", None)  # which only the summary says
+    assert mine == other
 
 
 def test_what_comes_is_out_where_a_query_is_broken_off(command: str, crossroads: Path) -> None:
