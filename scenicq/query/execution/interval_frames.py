@@ -51,11 +51,14 @@ def frames_of(dataset: Dataset, result: Result) -> Iterator[tuple[Label, dict[st
 
 
 def verdict_at(label: Label, result: Result) -> Verdict:
-    """The verdict of a result with the label objects of one of its frames in the roles; arguments as of `roles_in`."""
+    """The verdict of a result with the label objects of one of its frames in the roles; arguments as of `roles_in`.
+
+    Values of random variables are those of the initial scene, and of no other frame.
+    """
     roles = roles_in(label, result)
     match result.verdict:
         case Match(witness=witness):
-            return Match(roles, witness)
+            return Match(roles, witness if label.frame == result.frame else {})
         case Unknown(reason, cause):
             return Unknown(reason, cause, roles)
         case NoMatch(cause):
