@@ -33,7 +33,7 @@ from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN
 __all__ = ["IntervalExplanation", "changes_of", "explain_beginning", "explain_recording", "placed"]
 
 
-_MOST_AROUND = 5
+_AROUND_SHOWN = 5
 """Intervals around a frame that are named."""
 
 _Start = tuple[DecidedStart, int]
@@ -283,7 +283,7 @@ def _explain_within(query: Query, solver: Solver, label: Label) -> tuple[Verdict
 
 def _listed(intervals: Sequence[Result]) -> list[str]:
     """Intervals, one a line."""
-    lines = [_around(each) for each in intervals[:_MOST_AROUND]]
+    lines = [_around(each) for each in intervals[:_AROUND_SHOWN]]
     return lines if len(intervals) <= len(lines) else [*lines, f"  and {len(intervals) - len(lines)} more"]
 
 
