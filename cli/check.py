@@ -27,13 +27,13 @@ from scenicq.query.execution.option_texts import VERSIONS
 from scenicq.query.execution.program_files import SiblingFiles
 from scenicq.store.dataset import Dataset
 
-from .cache import user_cache
 from .datasets import open_checked
 from .main import ERROR
 from .manual import Manual
 from .programs import MAP_DEFAULTS, PROGRAM_TEXT, SCENARIO, given_program
 from .report import as_json, count, show
 from .streams import say
+from .user_folders import map_cache
 
 __all__ = ["check", "networks_of", "read_version"]
 
@@ -63,10 +63,12 @@ def networks_of(
         opened = open_checked(dataset)
         yield from (opened.network(name) for name in opened.maps)
     elif map_file is not None:
-        yield read_network(map_file, user_cache() / "maps")
+        with map_cache() as cache:
+            yield read_network(map_file, cache)
     else:
         try:
-            named = program_network(source, Path(source.name).parent, version, user_cache() / "maps")
+            with map_cache() as cache:
+                named = program_network(source, Path(source.name).parent, version, cache)
         except DataError as error:
             if warnings is None:
                 raise

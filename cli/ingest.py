@@ -12,12 +12,12 @@ from scenicq.importers.ingest import ingest as make_dataset
 from scenicq.option_values import Count
 from scenicq.store.manifest import LeftOut
 
-from .cache import user_cache
 from .manual import Manual
 from .option_type import OptionType
 from .output import ProgressBar
 from .report import columns, count, show_few
 from .sources import remember
+from .user_folders import map_cache
 
 __all__ = ["defects", "ingest"]
 
@@ -94,7 +94,7 @@ def ingest(source: Path, dataset: Path, *, format_: str | None, maps: tuple[str,
     The dataset appears when it is complete: an error or an interrupt leaves what was there before.
     """
     started = time.perf_counter()
-    with ProgressBar(quiet=quiet) as bar:
+    with ProgressBar(quiet=quiet) as bar, map_cache() as cache:
         summary = make_dataset(
             source,
             dataset,
@@ -102,7 +102,7 @@ def ingest(source: Path, dataset: Path, *, format_: str | None, maps: tuple[str,
             maps=maps,
             class_map=class_map,
             ego=ego,
-            map_cache=user_cache() / "maps",
+            map_cache=cache,
             strict=strict,
             force=force,
             update=update,

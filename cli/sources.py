@@ -9,8 +9,6 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import json
-import os
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,11 +20,12 @@ from scenicq.store.place import Place, find_place
 from scenicq.store.sound_notes import SoundNotes
 
 from .report import show
+from .user_folders import state_folder
 
 if TYPE_CHECKING:  # an ingest needs no DuckDB, which comes with this
     from scenicq.store.dataset import Dataset
 
-__all__ = ["SENSORS", "is_noted_sound", "note_sound", "recorded", "remember", "sensor_root", "state_folder"]
+__all__ = ["SENSORS", "is_noted_sound", "note_sound", "recorded", "remember", "sensor_root"]
 
 SENSORS = click.option(
     "--sensors",
@@ -111,20 +110,3 @@ def _digest(manifest: bytes) -> str:
 
 def _notes() -> Path:
     return state_folder() / "ingested.jsonl"
-
-
-def state_folder() -> Path:
-    """The folder of what this program remembers for this user; it need not be there.
-
-    Raises:
-        RuntimeError: The user has no home.
-    """
-    if sys.platform == "win32":
-        base = os.environ.get("LOCALAPPDATA")
-        folder = Path(base) if base else Path.home() / "AppData" / "Local"
-    elif sys.platform == "darwin":
-        folder = Path.home() / "Library" / "Application Support"
-    else:
-        base = os.environ.get("XDG_STATE_HOME", "")
-        folder = Path(base) if Path(base).is_absolute() else Path.home() / ".local" / "state"
-    return folder / "scenicq"

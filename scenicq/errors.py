@@ -100,6 +100,7 @@ CODES: dict[str, str] = {
     # the answers
     "frame-excluded": "what a frame shows is not what the program allows",
     "never-compared": "the program sets what no label of the dataset has",
+    "class-absent": "the program has a role for a class that no label object of the dataset has",
     "no-tracks": "a program over time, and objects of which nothing says that they are the same in several labels",
     # what compiles but cannot be meant
     "angle-without-deg": "an angle of more than a full turn, which may be meant in degrees",
@@ -114,6 +115,9 @@ CODES: dict[str, str] = {
     "condition-alone": "a condition on a line of its own, which asks nothing",
     "ego-twice": "two objects that are both made the ego",
     "speed-beyond-roads": "a speed that no road sees, which may be meant in km/h",
+    "default-view": "what cannot be seen under a view that the program does not set",
+    "exact-place": "one point beside another object, to within a small tolerance",
+    "mutated-place": "a place or direction that noise without bound takes back",
     "box-cannot-fit": "a region that is too small for the object that must lie in it",
     "class-folded": "a class that coarse classes do not tell from others",
     "unknown-property": "a property that no class has and nothing reads",

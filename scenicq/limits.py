@@ -161,7 +161,13 @@ class Limits:
         8, "roles", "that are filled in the order of the program", "the most constrained first"
     )
     ordered_steps: int = _otherwise(
-        64, "candidates", "that are tried in the order of the program", "the most constrained first"
+        64,
+        "candidates",
+        "that are tried in the order of the program, from one correspondence to the next",
+        "the most constrained first",
+    )
+    nearer_steps: int = _shorter(
+        1000, "candidates", "that are tried for a correspondence with nearer objects than one that is found"
     )
     arc_roles: int = _otherwise(
         2, "roles", "of a group whose candidates are thinned by intervals", "the search decides the group"

@@ -20,6 +20,8 @@ README = (LIBRARY / "README.md").read_text()
 PASSES = ("forest/", "match/", "query/prefilter/", "temporal/")
 """Where expressions are gone through. Syntax and compiler recurse over the program's text, which the parser limits."""
 RECURSIVE = {
+    "forest/among.py": "what is asked of each label object asks others again, as deep as the program nests it",
+    "forest/value_numbers.py": "likewise",
     "forest/unobserved.py": "choices inside one comparison, at most a stated number of them",
     "match/decide/cascade.py": "the discrete variables and truth values of a group, at most a stated number of them",
     "match/decide/decomposition.py": "each part has fewer constraints, or fewer distances of hidden points",

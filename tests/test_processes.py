@@ -161,6 +161,7 @@ def test_starting_processes_may_be_killed_now_and_then(monkeypatch, tmp_path):
         list(workers.run([7]))
 
 
+@pytest.mark.slow
 def test_processes_that_never_start_are_no_endless_loop(monkeypatch):
     monkeypatch.setattr("scenicq.processes._serve", os._exit)
     with pytest.raises(DataError, match="before they have started"), Workers(1, squares, (0,)) as workers:

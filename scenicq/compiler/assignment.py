@@ -6,18 +6,21 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, cast
 
 from scenicq.compiler.arithmetic import hashed
+from scenicq.compiler.coerce import to_boolean
 from scenicq.compiler.environment import Environment
 from scenicq.compiler.items import items_of
 from scenicq.compiler.known_properties import known_truth
 from scenicq.compiler.logic import condition
-from scenicq.compiler.values import ModelValue, describe, fail
+from scenicq.compiler.other_objects import gathered
+from scenicq.compiler.values import Instance, LabelObjects, ModelValue, OtherList, describe, fail
 from scenicq.errors import Span
+from scenicq.forest.nodes import Node
 from scenicq.syntax import ast
 
 if TYPE_CHECKING:
     from scenicq.compiler.interpreter import Interpreter
 
-__all__ = ["assign", "assign_around", "go_through"]
+__all__ = ["assign", "assign_around", "go_through", "through_others"]
 
 
 def assign(run: Interpreter, target: ast.Expression, value: ModelValue, scope: Environment) -> None:
@@ -68,10 +71,40 @@ def assign_around(run: Interpreter, target: ast.Name, value: ModelValue, scope: 
 
 
 def go_through(
-    run: Interpreter, clauses: tuple[ast.Clause, ...], scope: Environment, visit: Callable[[Environment], None]
-) -> None:
-    """Visit every combination of a comprehension, whose names live in one scope of their own."""
-    _nest(run, clauses, scope, Environment({}, scope, comprehension=True), visit)
+    run: Interpreter, clauses: tuple[ast.Clause, ...], scope: Environment, visit: Callable[[Environment], None],
+    first: ModelValue = ...,
+) -> None:  # fmt: skip
+    """Visit every combination of a comprehension, whose names live in one scope of their own.
+
+    Args:
+        run: The interpreter.
+        clauses: The clauses.
+        scope: The names around, which the first list sees.
+        visit: Called for each.
+        first: The first list, where it is evaluated already.
+    """
+    _nest(run, clauses, scope, Environment({}, scope, comprehension=True), visit, first)
+
+
+def through_others(run: Interpreter, node: ast.Comprehension, objects: LabelObjects, scope: Environment) -> OtherList:
+    """A comprehension over label objects that play no role, which is evaluated for one that stands for each.
+
+    Raises:
+        ScenarioError: unsupported-construct, where there is more than one `for`, or a set is made.
+    """
+    (clause, *more) = node.clauses
+    if more or node.kind == "set":
+        what = more[0].span if more else node.span
+        raise fail("unsupported-construct", "a list of other label objects has one `for`", what, "not that one",
+                   ("ask about one of them after the other, with `any` inside `any`",))  # fmt: skip
+    inner = Environment({}, scope, comprehension=True)
+
+    def visit(element: Instance) -> tuple[tuple[Node, ...], ModelValue]:
+        assign(run, clause.target, element, inner)
+        conditions = tuple(to_boolean(condition(run, test, inner), test.span) for test in clause.conditions)
+        return conditions, run.evaluate(node.element, inner)
+
+    return gathered(objects, clause.iterable.span, visit)
 
 
 def _nest(
@@ -80,12 +113,14 @@ def _nest(
     around: Environment,
     inner: Environment,
     visit: Callable[[Environment], None],
+    first: ModelValue = ...,
 ) -> None:
     if not clauses:
         visit(inner)
         return
     clause = clauses[0]
-    for item in items_of(run, run.evaluate(clause.iterable, around), clause.iterable.span):
+    iterable = run.evaluate(clause.iterable, around) if first is ... else first
+    for item in items_of(run, iterable, clause.iterable.span):
         run.budget.step(clause.span)
         assign(run, clause.target, item, inner)
         if all(known_truth(run, condition(run, test, inner), test.span) for test in clause.conditions):

@@ -9,8 +9,19 @@ from typing import cast
 from scenicq.compiler import operators
 from scenicq.compiler.arithmetic import check_weight, hashed, is_flat, is_random, plain_binary
 from scenicq.compiler.coerce import kind_of_model
+from scenicq.compiler.other_objects import is_element, is_nearest, same_object
 from scenicq.compiler.random_values import holds_instances, is_choice, lift, possible_values
-from scenicq.compiler.values import Choice, Instance, ModelValue, describe, fail, is_node
+from scenicq.compiler.values import (
+    Choice,
+    Instance,
+    LabelObjects,
+    ModelValue,
+    Nearest,
+    OtherList,
+    describe,
+    fail,
+    is_node,
+)
 from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.forest.nodes import CompareOp, Constant, Node, Select
@@ -103,6 +114,23 @@ def _numbered(value: ModelValue, codes: dict[ModelValue, float], span: Span) -> 
 
 
 def _compare_known(op: str, left: ModelValue, right: ModelValue, span: Span) -> ModelValue:
+    if op not in _SAMENESS or not (isinstance(left, Instance) and isinstance(right, Instance)):
+        return _compare_values(op, left, right, span)
+    if isinstance(left, Nearest) or isinstance(right, Nearest):
+        one, other = (right, left) if isinstance(left, Nearest) else (left, right)
+        if isinstance(one, Nearest) or not isinstance(other, Nearest):
+            raise fail("wrong-type", "only an object can be the nearest", span, f"this is {describe(one)}")
+        same = is_nearest(one, other, span)
+    elif is_element(left) or is_element(right):
+        same = same_object(left, right, span)
+    else:
+        return _compare_values(op, left, right, span)
+    if isinstance(same, bool):
+        return same is not _SAMENESS[op]
+    return operators.combine("not", [same], span) if _SAMENESS[op] else same
+
+
+def _compare_values(op: str, left: ModelValue, right: ModelValue, span: Span) -> ModelValue:
     if op in ("is", "is not"):
         if is_random(left) != is_random(right) and not isinstance(left, bool | type(None)) and right is not None:
             raise fail("random-branch", f"`{op}` asks for one and the same value, which a random one is not", span,
@@ -217,4 +245,8 @@ def iterate(value: ModelValue, span: Span) -> list[ModelValue]:
     if is_random(value):
         raise fail("random-branch", "a random list cannot be gone through", span, "random here",
                    ("use `Uniform(*list)` to pick one of its items",))  # fmt: skip
+    if isinstance(value, LabelObjects | OtherList):
+        hint = "ask with `any(... for c in others(C))`, `all(...)`, `len([...])`, or `count(C)`"
+        what = "the other label objects cannot be gone through one by one"
+        raise fail("unsupported-construct", what, span, "not a list", (hint,))
     raise fail("wrong-type", f"{describe(value)} cannot be gone through", span, "not a list")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, assert_never, cast
 
 from scenicq.compiler import operators
 from scenicq.compiler.arithmetic import hashed, plain_unary
-from scenicq.compiler.assignment import assign_around, go_through
+from scenicq.compiler.assignment import assign_around, go_through, through_others
 from scenicq.compiler.attributes import attribute
 from scenicq.compiler.comparisons import binary, compare, iterate, symbolic
 from scenicq.compiler.courses import option_of
@@ -29,6 +29,7 @@ from scenicq.compiler.values import (
     Choice,
     Function,
     Instance,
+    LabelObjects,
     ModelValue,
     Module,
     ScenicClass,
@@ -265,8 +266,12 @@ def _evaluate(run: Interpreter, node: ast.Expression, scope: Environment) -> Mod
         case ast.Lambda():
             return run.make_function("<lambda>", node.parameters, node.body, scope, span)
         case ast.Comprehension():
+            # the first list is evaluated outside of the comprehension
+            first = evaluate(run, node.clauses[0].iterable, scope)
+            if isinstance(first, LabelObjects):
+                return through_others(run, node, first, scope)
             items: list[ModelValue] = []
-            go_through(run, node.clauses, scope, lambda inner: items.append(evaluate(run, node.element, inner)))
+            go_through(run, node.clauses, scope, lambda inner: items.append(evaluate(run, node.element, inner)), first)
             return {hashed(item, span) for item in items} if node.kind == "set" else items
         case ast.DictComprehension():
             table: dict[ModelValue, ModelValue] = {}

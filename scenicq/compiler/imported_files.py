@@ -16,7 +16,7 @@ Loader = Callable[[str], Source | None]
 """Gives the text of a file of the program's folder, by its path there; None if there is none. The text of a
 folder, whose path ends with `/`, is empty."""
 
-_OWN = frozenset({"math", "scenic"})
+_OWN = frozenset({"math", "scenic", "scenicq"})
 """Packages that no file stands in for."""
 _ENDINGS = (".scenic", ".sc")
 

@@ -10,11 +10,13 @@ from scenicq.compiler.builtins import language_names
 from scenicq.compiler.environment import FIRST_LIBRARIES, Environment
 from scenicq.compiler.imported_files import ImportedFiles, Loader, absolute, packages
 from scenicq.compiler.interpreter import Interpreter
+from scenicq.compiler.label_questions import LABELS, question_names
 from scenicq.compiler.models import (
     is_dynamic,
     is_package,
     libraries_of,
     library_text,
+    members_of,
     network_names,
     plain_module,
     unsupported_module,
@@ -145,14 +147,17 @@ class Modules:
             raise fail("unknown-name", f"`{module.name}` has no `{alias.path}` yet: it is imported in a circle",
                        alias.span, "not found",
                        (f"`import {module.name}` takes its names when they are used",))  # fmt: skip
-        close = similar(alias.path, module.names)
+        close = similar(alias.path, {*module.names, *members_of(module.name)})
         raise fail("unknown-name", f"`{module.name}` has no `{alias.path}`", alias.span, "not found",
                    (f"it has `{close}`",) if close else ())  # fmt: skip
 
     def _is_there(self, name: str) -> bool:
-        return is_dynamic(name) or is_package(name) or bool(libraries_of(name)) or self._files.find(name) is not None
+        known = is_dynamic(name) or is_package(name) or bool(libraries_of(name)) or name == LABELS
+        return known or self._files.find(name) is not None
 
     def _model(self, name: str) -> Module | None:
+        if name == LABELS:
+            return Module(name, question_names(self.interpreter))
         files = libraries_of(name)
         if not files:
             return None

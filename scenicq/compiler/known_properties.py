@@ -56,6 +56,8 @@ def as_constant(run: Interpreter, value: ModelValue) -> ModelValue:
 
 def _definition(run: Interpreter, key: tuple[int, str]) -> Node | None:
     """What the program says of a property, as far as it is an expression or a plain value."""
+    if key[0] < 0 or key[1].startswith("#"):
+        return None
     instance = run.objects[key[0]]
     if key[1] in MOTION and key[1] not in instance.explicit:
         return None

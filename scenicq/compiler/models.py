@@ -14,6 +14,7 @@ from importlib import resources
 
 from scenicq.compiler.builtins import mathematics
 from scenicq.compiler.elements import MANEUVER_TYPES
+from scenicq.compiler.label_questions import LABELS
 from scenicq.compiler.values import Builtin, ModelValue, Module, fail
 from scenicq.errors import ScenarioError, Source, Span, similar
 from scenicq.forest import build
@@ -43,6 +44,7 @@ __all__ = [
     "libraries_of",
     "library_text",
     "library_texts",
+    "members_of",
     "network_names",
     "plain_module",
     "unsupported_module",
@@ -157,7 +159,14 @@ def is_dynamic(name: str) -> bool:
 
 def is_package(name: str) -> bool:
     """Whether modules that are known here lie in a package of this name."""
-    return any(known.startswith(f"{name}.") for known in (*_LIBRARIES, *_WITHOUT_CLASSES))
+    return bool(members_of(name))
+
+
+def members_of(package: str) -> set[str]:
+    """The modules and packages in a package that are known here, by the names that they have there."""
+    start = f"{package}."
+    inside = (known for known in (*_LIBRARIES, *_WITHOUT_CLASSES, LABELS) if known.startswith(start))
+    return {known.removeprefix(start).partition(".")[0] for known in inside}
 
 
 def network_names(network: Network, library: str) -> dict[str, ModelValue]:
@@ -217,12 +226,12 @@ def plain_module(name: str, span: Span) -> Module:
             raise fail("unsupported-construct", f"`{name}` is not supported: labels are matched in 2D", span,
                        "shapes in space", ("give objects a `width` and a `length` instead of a shape",))  # fmt: skip
         case _:
-            close = similar(name, _LIBRARIES)
+            close = similar(name, (*_LIBRARIES, LABELS))
             nearest = (f"`{close}` is the nearest that is known",) if close else ()
             raise fail("unknown-model", f"`{name}` is not a model or module known here", span, "not found",
                        (*nearest,
                         "known are `scenic.domains.driving.model`, the models of Scenic's driving simulators, "
-                        "and `math`",
+                        f"`{LABELS}` and `math`",
                         "a scenario imports Scenic files of its own folder, never Python code"))  # fmt: skip
 
 

@@ -14,9 +14,10 @@ from scenicq.compiler.comparisons import compare
 from scenicq.compiler.expressions import call
 from scenicq.compiler.items import components, is_vector, items_of
 from scenicq.compiler.known_properties import as_constant, known_truth
+from scenicq.compiler.other_objects import gathered_truth, how_many
 from scenicq.compiler.random_values import each_existing, is_choice
 from scenicq.compiler.rounding import in_order
-from scenicq.compiler.values import Builtin, Choice, Function, ModelValue, fail
+from scenicq.compiler.values import Builtin, Choice, Function, LabelObjects, ModelValue, OtherList, fail
 from scenicq.errors import Span
 from scenicq.forest.nodes import Constant
 
@@ -73,6 +74,8 @@ def sequence_functions(run: Interpreter) -> dict[str, ModelValue]:
 
     def quantified(op: str) -> Callable[..., ModelValue]:
         def decide(span: Span, items: ModelValue) -> ModelValue:
+            if isinstance(items, OtherList):
+                return gathered_truth(op, items, span)
             values = items_of(run, items, span)
             run.budget.step(span, len(values) // 2)
             known = [truth(value, span) for value in values if not is_random(value)]
@@ -111,6 +114,8 @@ def sequence_functions(run: Interpreter) -> dict[str, ModelValue]:
         plain: Builtin = language_names()[name]
 
         def apply_to(span: Span, *args: ModelValue) -> ModelValue:
+            if name == "len" and len(args) == 1 and isinstance(args[0], OtherList | LabelObjects):
+                return how_many(args[0], span)
             return plain.call(span, *(components(run, each, span) if is_vector(each) else each for each in args))
 
         return apply_to

@@ -20,8 +20,11 @@ __all__ = [
     "Delayed",
     "Function",
     "Instance",
+    "LabelObjects",
     "ModelValue",
     "Module",
+    "Nearest",
+    "OtherList",
     "PropertyDefinition",
     "ScenicClass",
     "describe",
@@ -143,6 +146,51 @@ class Instance:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class LabelObjects:
+    """Label objects of a class: those without a role, or all but the ego.
+
+    Attributes:
+        cls: The class.
+        excluded: The tracks of those who are left out.
+    """
+
+    cls: ScenicClass
+    excluded: tuple[Node, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OtherList:
+    """A list with something of each of some label objects.
+
+    Attributes:
+        objects: The label objects.
+        element: What stands for each.
+        conditions: Which of them count.
+        value: What the list has of each.
+    """
+
+    objects: LabelObjects
+    element: Instance
+    conditions: tuple[Node, ...]
+    value: ModelValue
+
+
+@dataclass(slots=True, eq=False)
+class Nearest(Instance):
+    """`nearest(C)`: a point with the properties of the nearest label object of a class.
+
+    Attributes:
+        objects: The label objects of the class.
+        counts: Which of them count, given what stands for each.
+        ego: To whom they are near.
+    """
+
+    objects: LabelObjects | None = None
+    ego: ModelValue = None
+    counts: Callable[[Instance], Node] | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Delayed:
     """A value that needs properties of the object being specified, such as `10 deg relative to roadDirection`.
 
@@ -242,6 +290,8 @@ _NAMES: dict[type, str] = {
     ScenicClass: "a class",
     Module: "a module",
     Choice: "a random choice",
+    LabelObjects: "the other label objects of a class",
+    OtherList: "a list of other label objects",
     Delayed: "a value that depends on an object's position",
 }
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from scenicq.budget import Exhausted, limited
 from scenicq.errors import DataError, Diagnostic, Note, ScenarioError
 from scenicq.exporters.interchange import label_record, write_map
+from scenicq.exporters.scene_others import of_its_objects
 from scenicq.forest.improvise import Improviser, Scene
 from scenicq.forest.nodes import Value
 from scenicq.forest.scenario import BuiltIn, Scenario
@@ -82,7 +83,7 @@ def sample_labels(
         ScenarioError: impossible-requirement, where no scene comes up; deadline-passed, where none does in the time.
     """
     rng = random.Random(seed)
-    improviser = Improviser(scenario, frozenset(BuiltIn) - waive)
+    improviser = Improviser(of_its_objects(scenario), frozenset(BuiltIn) - waive)
     for number in range(count):
         try:
             with limited(timeout_s):

@@ -7,10 +7,14 @@ so on.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from scenicq.errors import Span
 from scenicq.forest.compute import fold
 from scenicq.forest.nodes import (
+    MIRRORED,
+    Among,
+    AmongOp,
     Arithmetic,
     ArithmeticOp,
     Bearing,
@@ -82,8 +86,44 @@ def minus(left: Node, right: Node, span: Span | None = None) -> Node:
 
 
 def compare(op: CompareOp, left: Node, right: Node, span: Span | None = None) -> Node:
-    """A comparison."""
+    """A comparison; of how many label objects there are with a number, whether there are at least so many."""
+    for one, other, way in ((left, right, op), (right, left, MIRRORED.get(op, op))):
+        match one, other:
+            case Among(op=AmongOp.COUNT), Constant(value=float() as number) if abs(number) < _MANY:
+                return _count_against(one, way, number, span)
+            case _:
+                pass
     return fold(Compare(op, left, right, span=span))
+
+
+_MANY = 1e9
+
+
+def _count_against(many: Among, op: CompareOp, number: float, span: Span | None) -> Node:
+    def at_least(least: int) -> Node:
+        if least <= 0:
+            return constant(True, span)
+        return replace(many, op=AmongOp.AT_LEAST, kind="boolean", number=least, span=span)
+
+    def negation(node: Node) -> Node:
+        return logic(LogicOp.NOT, node, span=span)
+
+    match op:
+        case CompareOp.GE:
+            return at_least(math.ceil(number))
+        case CompareOp.GT:
+            return at_least(math.floor(number) + 1)
+        case CompareOp.LT:
+            return negation(at_least(math.ceil(number)))
+        case CompareOp.LE:
+            return negation(at_least(math.floor(number) + 1))
+        case _ if number != math.floor(number):
+            return constant(op is CompareOp.NE, span)
+        case _:
+            more = negation(at_least(int(number) + 1))
+            least = at_least(int(number))
+            same = more if isinstance(least, Constant) else logic(LogicOp.AND, least, more, span=span)
+            return same if op is CompareOp.EQ else negation(same)
 
 
 def logic(op: LogicOp, *args: Node, span: Span | None = None) -> Node:

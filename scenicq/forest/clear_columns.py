@@ -13,6 +13,7 @@ from scenicq.forest.columns import UNKNOWN, Column
 from scenicq.forest.ego_frame import DISTANCE, PLACE, in_ego_frame
 from scenicq.forest.interpret import OnMap
 from scenicq.forest.nodes import (
+    Among,
     Arithmetic,
     ArithmeticOp,
     Bearing,
@@ -110,7 +111,7 @@ def quick_form(root: Node, ego: int) -> Node | None:
     quick = in_ego_frame(root, ego)
     times: dict[int, float] = {}
     for node in postorder((quick,)):
-        if is_leaf(node) or isinstance(node, OnMap):
+        if is_leaf(node) or isinstance(node, OnMap | Among):
             return None
         if isinstance(node, Feature) and node.property in (PLACE, DISTANCE):
             times[id(node)] = 1.0

@@ -38,6 +38,7 @@ from scenicq.forest.compute import CannotEvaluate, compute, directions
 from scenicq.forest.interpret import OnMap, RegionNode
 from scenicq.forest.kinds import as_kind
 from scenicq.forest.nodes import (
+    Among,
     Arithmetic,
     ArithmeticOp,
     Bearing,
@@ -124,12 +125,14 @@ class ColumnDomain:
         pick: Which of the headings that a vector field allows to take, given how many it allows at each place: numbers
             that broadcast with these; beyond the last they are the last.
         most: Places at which maps may be asked, or a node be computed place by place.
+        others: What holds of label objects at each place; unknown if not given.
     """
 
     observed: Callable[[Feature], Column]
     drawn: Callable[[Leaf, Sequence[Column]], Column]
     pick: Callable[[DirectionAt, NDArray[np.intp]], NDArray[np.intp]]
     most: float = math.inf
+    others: Callable[[Among, Sequence[Column]], Column] | None = None
 
     # --- leaves
 
@@ -148,6 +151,12 @@ class ColumnDomain:
     def variable(self, node: Leaf, args: Sequence[Column]) -> Column:
         """What is drawn."""
         return self.drawn(node, args)
+
+    def among(self, node: Among, args: Sequence[Column]) -> Column:
+        """What holds of label objects."""
+        if self.others is None:
+            return Column(np.full(1, np.nan), np.full(1, UNKNOWN))
+        return self.others(node, args)
 
     # --- numbers and vectors
 

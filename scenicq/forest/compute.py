@@ -14,6 +14,7 @@ from typing import cast
 
 from scenicq.forest.kinds import kind_of_value
 from scenicq.forest.nodes import (
+    Among,
     Arithmetic,
     ArithmeticOp,
     Bearing,
@@ -267,6 +268,8 @@ def _compute_region(node: Node, args: tuple[Value, ...]) -> Value:
             return _intersects(cast(Region, left), cast(Region, right))
         case Encloses(), (outer, inner):
             return _encloses(cast(Region, outer), cast(Region, inner))
+        case Among(), _:
+            raise CannotEvaluate("what holds of label objects without a role")
         case _:
             raise TypeError(f"no value for {args!r}")
 
@@ -277,6 +280,6 @@ def fold(node: Node) -> Node:
     if not below or not all(isinstance(child, Constant) for child in below):
         return node
     from_constants = cast("tuple[Constant, ...]", below)
-    if is_leaf(node) or isinstance(node, DirectionAt):
+    if is_leaf(node) or isinstance(node, DirectionAt | Among):
         return node
     return Constant(compute(node, tuple(child.value for child in from_constants)), span=node.span)

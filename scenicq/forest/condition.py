@@ -8,12 +8,16 @@ is an accident, so any will do.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import cast
 
+from scenicq.forest.among import LABEL_OBJECTS, LabelElements, among_column
+from scenicq.forest.columns import UNDEFINED, UNKNOWN, constant_column, value_reader
 from scenicq.forest.compute import compute, directions
 from scenicq.forest.evaluate import Observation
 from scenicq.forest.kinds import as_kind
 from scenicq.forest.nodes import (
+    Among,
     Constant,
     DirectionAt,
     Feature,
@@ -80,6 +84,8 @@ def condition(
             return next((part for part in children(leaf) if _is_undefined(part)), node)
         if isinstance(node, Constant):
             return node
+        if isinstance(node, Among):
+            return _fold_among(node, observed)
         if isinstance(node, Feature):
             key = (node.object, node.property)
             return Constant(as_kind(node, observed[key]), span=node.span) if key in observed else node
@@ -103,6 +109,21 @@ def _fold(node: Node) -> Node:
     if isinstance(node, DirectionAt):
         return _fold_direction(node, args)
     return Constant(compute(node, args), span=node.span)
+
+
+def _fold_among(node: Among, observed: Observation) -> Node:
+    """What is known of label objects; where that is not known, the node with what is."""
+    elements = cast(object, observed.get(LABEL_OBJECTS)) or node.elements
+    if not isinstance(elements, LabelElements):
+        return node
+    if not all(isinstance(child, Constant) for child in node.inputs):
+        return node if node.elements is elements else replace(node, elements=elements)
+    found = among_column(node, [constant_column(cast(Constant, child).value) for child in node.inputs], elements)
+    if found.status.max() == UNKNOWN:
+        return node if node.unknown is None else Constant(node.unknown, span=node.span)
+    if found.status.max() == UNDEFINED:
+        return Constant(Undefined(f"the label has no {node.category} that counts"), span=node.span)
+    return Constant(value_reader(found.data, (1,))(0), span=node.span)
 
 
 def _is_undefined(node: Node) -> bool:

@@ -10,6 +10,7 @@ from collections.abc import Container, Mapping, Sequence
 from typing import Protocol, TypeAlias, TypeVar, assert_never
 
 from scenicq.forest.nodes import (
+    Among,
     Arithmetic,
     ArithmeticOp,
     Bearing,
@@ -127,6 +128,10 @@ class AbstractDomain(Protocol[V]):
         """A region."""
         ...
 
+    def among(self, node: Among, args: Sequence[V]) -> V:
+        """What holds of label objects."""
+        ...
+
 
 def steps_of(*roots: Node, known: Container[int] = ()) -> Steps:
     """The steps in which expressions are interpreted; what they share once.
@@ -187,5 +192,7 @@ def _value(node: Node, args: list[V], domain: AbstractDomain[V]) -> V:
             return domain.on_map(node, args)
         case DiscAt() | SectorAt() | RectangleAt() | RegionUnion() | RegionIntersection() | RegionDifference():
             return domain.region(node, args)
+        case Among():
+            return domain.among(node, args)
         case _:
             assert_never(node)

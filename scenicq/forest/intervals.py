@@ -17,6 +17,8 @@ from scenicq.forest.interpret import OnMap, RegionNode
 from scenicq.forest.interval_arithmetic import IntervalArithmetic
 from scenicq.forest.interval_values import FloatOrArray, Interval, IntervalValue, IntervalVector, Truth
 from scenicq.forest.nodes import (
+    Among,
+    AmongOp,
     ArithmeticOp,
     CompareOp,
     DirectionAt,
@@ -226,6 +228,18 @@ class IntervalDomain(IntervalArithmetic[E]):
         if pairs and len(pairs) == len(options):
             return IntervalVector(self.hull([pair.x for pair in pairs]), self.hull([pair.y for pair in pairs]))
         return None
+
+    def among(self, node: Among, args: Sequence[IntervalValue[E]]) -> IntervalValue[E]:
+        """Nothing is known of other label objects."""
+        match node.kind:
+            case "boolean":
+                return _OPEN
+            case "vector":
+                return self._plane()
+            case "scalar":
+                return self.within(0.0, math.inf) if node.op is AmongOp.COUNT else self.everything()
+            case _:
+                return None
 
     # --- the map
 

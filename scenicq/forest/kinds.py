@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import cast
 
-from scenicq.forest.nodes import Constant, Feature, Kind, Node, Select, Undefined, Value
+from scenicq.forest.nodes import Among, Constant, Feature, Kind, Node, Select, Undefined, Value
 from scenicq.geometry.regions import Region
 
 __all__ = ["as_kind", "kind_of", "kind_of_value"]
@@ -43,4 +43,4 @@ def kind_of(node: Node) -> Kind:
         node = node.options[0]
     if isinstance(node, Constant):
         return kind_of_value(node.value)
-    return node.kind if isinstance(node, Feature) else node.value_kind
+    return node.kind if isinstance(node, Feature | Among) else node.value_kind

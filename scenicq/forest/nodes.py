@@ -21,8 +21,9 @@ from scenicq.geometry.fields import VectorField
 from scenicq.geometry.regions import Region
 
 __all__ = [
-    "MIRRORED",
-    "Arithmetic", "ArithmeticOp", "Bearing", "Compare", "CompareOp", "Constant", "Contains", "Coordinate",
+    "ELEMENT", "GIVEN", "IDENTITY", "MIRRORED", "RANK", "TRACK",
+    "Among", "AmongOp", "Arithmetic", "ArithmeticOp", "Bearing", "Body", "Compare", "CompareOp", "Constant",
+    "Contains", "Coordinate",
     "DirectionAt", "DiscAt", "DiscreteRange", "Distance", "Encloses", "Feature", "Identity", "Index", "Intersects",
     "Kind", "Leaf", "Logic", "LogicOp", "Node", "Norm", "Normal", "PointIn", "Range", "RectangleAt",
     "RegionDifference", "RegionIntersection", "RegionUnion", "Rotate", "Scale", "SectorAt", "Select",
@@ -414,9 +415,71 @@ class Encloses(_Boolean):
     inner: Node
 
 
+# --- the label objects of a label, whether or not they play a role
+
+ELEMENT, GIVEN = -2, -3
+"""What features in a `Body` are of: the label object in question, or what is given from around, by its number."""
+IDENTITY, TRACK, RANK = "#id", "#track", "#rank"
+"""Properties of whoever plays an object, as numbers: who it is, where it is observed; who it is, wherever it is; its
+place among the ids of its label."""
+
+
+class AmongOp(StrEnum):
+    """What is told of the label objects of a class."""
+
+    AT_LEAST = "at least"
+    EVERY = "every"
+    COUNT = "count"
+    NEAREST = "nearest"
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """What is asked of each label object: expressions over features of `ELEMENT` and `GIVEN`.
+
+    Not children of the node that has it: they have a value for each label object.
+
+    Attributes:
+        condition: Whether it counts.
+        distance: How far away it is; of the nearest.
+        value: What of the nearest is the value.
+    """
+
+    condition: Node
+    distance: Node | None = None
+    value: Node | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Among(_Node):
+    """What holds of the label objects of a class, in three truth values (`forest/among`).
+
+    Attributes:
+        op: Whether at least so many count, or all do; how many do; or something of the nearest of those that do.
+        category: The class.
+        body: What counts.
+        kind: What kind of value it has.
+        number: How many, for `AT_LEAST`.
+        excluded: How many of the inputs, the first ones, are the identities of label objects that are left out.
+        inputs: What the body is given.
+        elements: The label objects, where they are known before all inputs are.
+        unknown: What stands for a truth value that is not known, where that is decided.
+    """
+
+    op: AmongOp
+    category: str
+    body: Body
+    kind: Kind
+    number: int
+    excluded: int
+    inputs: tuple[Node, ...]
+    elements: object = field(default=None, kw_only=True, repr=False)
+    unknown: bool | None = field(default=None, kw_only=True)
+
+
 Leaf: TypeAlias = Range | Normal | TruncatedNormal | DiscreteRange | Index | PointIn
 Node: TypeAlias = (
     Constant | Feature | Leaf | Select | Arithmetic | Coordinate | Norm | Bearing | Distance | DirectionAt |
     VectorOf | VectorSum | Scale | Rotate | DiscAt | SectorAt | RectangleAt | RegionUnion | RegionIntersection |
-    RegionDifference | Compare | Logic | Contains | Intersects | Encloses
+    RegionDifference | Compare | Logic | Contains | Intersects | Encloses | Among
 )  # fmt: skip

@@ -8,12 +8,14 @@ wherever it may (Kleene's logic).
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.forest.kinds import kind_of
 from scenicq.forest.nodes import (
     MIRRORED,
+    Among,
     Arithmetic,
     ArithmeticOp,
     Compare,
@@ -40,12 +42,12 @@ Truths = tuple[Node, Node]
 """A condition that holds only where another surely holds, and one that holds wherever that may hold."""
 
 
-def certain_and_possible(root: Node, unobserved: Callable[[Feature], bool]) -> Truths:
+def certain_and_possible(root: Node, unobserved: Callable[[Feature | Among], bool]) -> Truths:
     """What a condition is known to be without what is not observed.
 
     Args:
         root: The condition.
-        unobserved: Whether a feature is not observed.
+        unobserved: Whether a feature is not observed, or what holds of label objects is not known.
 
     Returns:
         The condition itself twice where it reads nothing unobserved.
@@ -75,11 +77,14 @@ _FALSE, _TRUE = build.constant(False), build.constant(True)
 
 
 class _Reader:
-    def __init__(self, unobserved: Callable[[Feature], bool]) -> None:
+    def __init__(self, unobserved: Callable[[Feature | Among], bool]) -> None:
         self._unobserved = unobserved
         self._numbers = ValueNumbers()
         self._known: dict[int, int] = {}
         self._alive: list[Node] = []  # as numbers are known by ids
+
+    def _hides(self, node: Node) -> bool:
+        return isinstance(node, Feature | Among) and self._unobserved(node)
 
     def _number(self, node: Node) -> int:
         self._alive.append(node)
@@ -119,7 +124,9 @@ class _Reader:
         seen: set[int] = set()
         for node in postorder((root,)):
             below = children(node)
-            if (isinstance(node, Feature) and self._unobserved(node)) or any(id(each) in reading for each in below):
+            if (isinstance(node, Feature | Among) and self._unobserved(node)) or any(
+                id(each) in reading for each in below
+            ):
                 reading.add(id(node))
             if isinstance(node, Logic) and node.op is LogicOp.NOT:
                 continue  # it counts as what it negates, where it is asked for
@@ -161,7 +168,9 @@ class _Reader:
         found: dict[int, Truths] = {}
         for node in postorder((root,)):
             below = children(node)
-            if (isinstance(node, Feature) and self._unobserved(node)) or any(id(each) in reading for each in below):
+            if (isinstance(node, Feature | Among) and self._unobserved(node)) or any(
+                id(each) in reading for each in below
+            ):
                 reading.add(id(node))
             if kind_of(node) == "boolean" or node is root:
                 reads = id(node) in reading
@@ -171,6 +180,10 @@ class _Reader:
     def _one(self, node: Node, found: dict[int, Truths], reading: set[int], selects: int) -> Truths:
         """The same of a node that reads what is not observed, after those below it."""
         match node:
+            case Among(kind="boolean") if self._unobserved(node) and not all(
+                isinstance(each, Constant) for each in node.inputs
+            ):
+                return replace(node, unknown=False), replace(node, unknown=True)
             case Logic(op=LogicOp.NOT, args=(arg,)) if id(arg) in found:
                 return _opposite(found[id(arg)])
             case Logic() if node.op is not LogicOp.NOT and all(id(arg) in found for arg in node.args):

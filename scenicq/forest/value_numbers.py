@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import cast
 
 from scenicq.forest.nodes import (
+    Among,
     Arithmetic,
     ArithmeticOp,
     Compare,
@@ -72,6 +73,10 @@ class ValueNumbers:
                     own = (type(node.value).__name__, parts_of(node.value))
                 case Feature():
                     own = (swap.get(node.object, node.object), node.property, node.current)
+                case Among():
+                    parts = [each for each in (node.body.condition, node.body.distance, node.body.value) if each]
+                    own = (node.op, node.category, node.number, node.excluded, *(self.expression(p) for p in parts))
+                    below = [*sorted(below[: node.excluded]), *below[node.excluded :]]
                 case Norm(vector=VectorSum(left, Scale(right, Constant(-1)))):
                     below = sorted((numbers[id(left)], numbers[id(right)]))
                 case Arithmetic(ArithmeticOp.ABS, (Arithmetic(ArithmeticOp.WRAP, (inner,)),)) if _is_difference(inner):
@@ -131,7 +136,7 @@ def is_total(node: Node) -> bool:
         case DirectionAt(field=Constant(value=VectorField() as field)):
             return field.reach is None
         case _:
-            return not isinstance(node, DirectionAt)
+            return not isinstance(node, DirectionAt | Among)
 
 
 def _is_difference(node: Node) -> bool:

@@ -25,6 +25,7 @@ from scenicq.forest.nodes import (
     Constant,
     Encloses,
     Feature,
+    Leaf,
     Logic,
     LogicOp,
     Node,
@@ -54,6 +55,8 @@ _BEYOND_MAP_M = 200.0
 """How far beyond the edges of the map labels may lie."""
 _MOST_POLYGONS = 2000
 _ROUNDING_M = 0.01
+_NEAR_M = 1.0
+"""A tolerance of positions below which few recorded objects stand at a point that a program names."""
 
 
 def _warning(code: str, message: str, span: Span | None, label: str, *hints: str) -> Diagnostic:
@@ -81,7 +84,9 @@ def lint_scenario(
     yield from _exclusive(scenario)
     yield from _folded(scenario, options)
     yield from _headings(scenario)
+    yield from _mutated(scenario)
     yield from _exact(scenario, options)
+    yield from _exact_places(scenario, options)
 
 
 def _dropped(scenario: Scenario, body: tuple[ast.Statement, ...]) -> Iterator[Diagnostic]:
@@ -250,7 +255,7 @@ def _too_large(scenario: Scenario, requirement: Requirement) -> Iterator[Diagnos
         short, long = sorted((width, length))
         if not any(_fits(region, short, long) for region in regions if isinstance(region, PolygonSet)):
             # what the program calls it is what stands there; the map may call it otherwise
-            written = " ".join(node.span.text.split()).rpartition(" in ")[2] if node.span is not None else ""
+            written = _written(node.span).rpartition(" in ")[2] if node.span is not None else ""
             name = written or cast("PolygonSet | PolylineSet", regions[0]).name
             where = f"`{name}`" if len(regions) == 1 else "any of these"
             yield _warning(
@@ -312,11 +317,35 @@ def _headings(scenario: Scenario) -> Iterator[Diagnostic]:
         given = not heading.explicit or heading.span == position.span
         turns = any(isinstance(node, Range) for node in postorder((heading.value,)))
         if given and not turns and is_class(owner.category) and _FREE_TO_TURN & set(ancestors(owner.category)):
-            placed = " ".join(position.span.text.split())
+            placed = _written(position.span)
             yield _warning(
                 "heading-implied", f"`{placed}` also says which way `{owner.name}` faces", position.span,
                 "gives its heading, too", "`facing Range(0, 360) deg` lets it face anywhere",
             )  # fmt: skip
+
+
+# --- noise
+
+
+def _mutated(scenario: Scenario) -> Iterator[Diagnostic]:
+    """Places and directions that the program gives, and that noise without bound takes back."""
+    lost: dict[Span, str] = {}
+    for owner in scenario.objects:
+        for name in sorted(owner.mutated & owner.properties.keys()):
+            given = owner.properties[name]
+            if given.explicit and given.span is not None:
+                lost.setdefault(given.span, owner.name)
+    if lost:
+        names = ", ".join(f"`{name}`" for name in dict.fromkeys(lost.values()))
+        yield _warning(
+            "mutated-place", f"where the program puts {names} excludes nothing: `mutate` adds noise without bound",
+            min(lost, key=lambda span: span.start), "may be anywhere",
+            "leave `mutate` out: `--tolerance` allows for what is not exact",
+        )  # fmt: skip
+
+
+def _written(span: Span) -> str:
+    return " ".join(span.text.split())
 
 
 # --- numbers that labels measure
@@ -341,3 +370,23 @@ def _exact(scenario: Scenario, options: MatchOptions) -> Iterator[Diagnostic]:
                     given.span, "compared without tolerance",
                     f"`--tolerance {name}=0.5` allows for it, as does `Range(a, b)` instead of {number}",
                 )  # fmt: skip
+
+
+def _exact_places(scenario: Scenario, options: MatchOptions) -> Iterator[Diagnostic]:
+    """One point beside another object, to within a small tolerance."""
+    tolerance = options.tolerance.for_scenario(scenario)
+    if tolerance.position <= EXACT.position:
+        return  # labels are said to be generated
+    for owner in scenario.objects:
+        given = owner.properties.get("position")
+        if given is None or not given.explicit or given.span is None or "position" in owner.mutated:
+            continue
+        near = tolerance.of(owner.index, "position").size
+        nodes = list(postorder((given.value,)))
+        beside = any(isinstance(node, Feature) and node.object != owner.index for node in nodes)
+        if beside and near < _NEAR_M and not any(isinstance(node, Leaf | Select) for node in nodes):
+            yield _warning(
+                "exact-place",
+                f"`{_written(given.span)}` is one point: `{owner.name}` must stand within {near:g} m of it", given.span,
+                "a place without extent", "`at ego offset by Range(-2, 2) @ Range(3, 30)` is an area",
+            )  # fmt: skip

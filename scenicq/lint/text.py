@@ -22,6 +22,7 @@ _ANGLE_PROPERTIES = frozenset({"heading", "yaw", "roadDeviation", "viewAngle", "
 _MEASURED = frozenset({"speed", "width", "length", "height", "x", "y", "acceleration", "angularSpeed"})
 _ORDERS = frozenset({"<", "<=", ">", ">=", "==", "!="})
 _RANGES = frozenset({"Range", "DiscreteRange", "TruncatedNormal"})
+_VIEW = frozenset({"visibleDistance", "viewAngle", "viewAngles", "viewDistance"})
 _POINTS = frozenset({"Point", "OrientedPoint"})
 _READ_BY_MODELS = frozenset({"ego", "workspace", "simulation", "simulator", "_"})
 _OF_SCENIC = frozenset({
@@ -53,6 +54,7 @@ def lint_text(body: tuple[ast.Statement, ...], *, properties: bool) -> Iterator[
         yield from _fast(node)
     yield from _signed(nodes)
     yield from _egos(body)
+    yield from _unseen(nodes)
     yield from _facing_objects(nodes)
     yield from _unused(nodes)
     if properties:
@@ -278,6 +280,25 @@ def _fast(node: ast.SyntaxNode) -> Iterator[Diagnostic]:
                     "speed-beyond-roads", f"{text} m/s are {value * 3.6:.0f} km/h", term.span, "speeds are in m/s",
                     f"write `{text} / 3.6` for km/h",
                 )  # fmt: skip
+
+
+def _unseen(nodes: list[ast.SyntaxNode]) -> Iterator[Diagnostic]:
+    """`not` of what can be seen, under the view that classes have by default."""
+    given = {node.property for node in nodes if isinstance(node, ast.WithSpecifier)}
+    given |= {node.name for node in nodes if isinstance(node, ast.PropertyDefault | ast.Attribute)}
+    if given & _VIEW:
+        return
+    for node in nodes:
+        match node:
+            case ast.UnaryOp(operator="not", operand=ast.Phrase(row=phrases.CAN_SEE) as seen):
+                yield _warning(
+                    "default-view", f"`{_text(seen)}` asks whether it is within the view that its class has by "
+                    "default: nothing hides anything", node.span, "a matter of distance and direction",
+                    "a requirement on the distance says it plainly",
+                    "`with visibleDistance 30, with viewAngle 120 deg` sets a view",
+                )  # fmt: skip
+            case _:
+                pass
 
 
 # --- numbers that labels measure

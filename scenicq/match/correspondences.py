@@ -28,11 +28,9 @@ def correspondences(
     Raises:
         Exhausted: The search takes more steps, or more time, than it may.
     """
-    for signature, candidates in search.problem.signatures(plans.relevant):
-        plan = plans.plan(signature)
-        for solution in search.solutions(plan, candidates, plans.always_twins):
-            satisfied = tuple(outcome for _, outcome in solution.outcomes)
-            yield Finding(verdicts.match(label, solution), search, plan, solution.assignment, satisfied)
+    for plan, solution in search.solutions(plans.plan, plans.relevant, plans.always_twins):
+        satisfied = tuple(outcome for _, outcome in solution.outcomes)
+        yield Finding(verdicts.match(label, solution), search, plan, solution.assignment, satisfied)
     for plan, failure in search.open_ones():
         if not every_open:
             search.undecided = failure

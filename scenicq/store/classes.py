@@ -18,6 +18,7 @@ __all__ = [
     "Granularity",
     "ancestors",
     "class_matches",
+    "class_truth",
     "fold",
     "is_class",
     "is_subclass",
@@ -126,3 +127,11 @@ def class_matches(wanted: str, category: str, granularity: Granularity) -> bool:
     own = fold(category, granularity) if is_class(category) else category
     role = fold(wanted, granularity) if is_class(wanted) else wanted
     return own == role or (is_class(own) and role in ancestors(own))
+
+
+@cache
+def class_truth(wanted: str, category: str, classes: Granularity) -> int:
+    """Whether a label object of a class is of another: 0 for not, 1 where its class is a coarser one, 2 for surely."""
+    if not category:
+        return 0
+    return 2 if class_matches(wanted, category, classes) else int(class_matches(category, wanted, classes))

@@ -2,7 +2,8 @@
 
 A label's own velocity counts first. What a label does not say comes from differences over the neighbouring samples of
 its track: central where it has two neighbours, else one-sided, never across more than `LONGEST_GAP_US` (as the nuScenes
-devkit does). Computed once, when a dataset is written.
+devkit does). An acceleration is the slope of a line through the speeds of at least a second and four samples: a
+difference of two speeds, which are differences themselves, is mostly noise. Computed once, when a dataset is written.
 """
 
 from __future__ import annotations
@@ -16,10 +17,14 @@ from numpy.typing import NDArray
 from scenicq.geometry.angles import normalize_array
 from scenicq.store.columns import MemberColumns
 
-__all__ = ["LONGEST_GAP_US", "MotionColumns", "motion_of", "track_numbers"]
+__all__ = ["FITTED_S", "FITTED_SAMPLES", "LONGEST_GAP_US", "MotionColumns", "motion_of", "track_numbers"]
 
 LONGEST_GAP_US = 1_500_000
 """Microseconds between two samples of a track beyond which neither says anything of the other."""
+FITTED_S = 1.0
+"""Seconds of which a derived acceleration is the slope of speed, at least."""
+FITTED_SAMPLES = 4
+"""Samples of which it is that, at least."""
 
 Numbers = NDArray[np.float64]
 
@@ -30,7 +35,7 @@ class MotionColumns:
 
     Attributes:
         vx, vy: Velocity in metres per second, map frame: the label's own, else derived.
-        acceleration: Change of the velocity along the heading, metres per second squared; always derived.
+        acceleration: Slope of the speed, which is negative backwards, metres per second squared; always derived.
         yaw_rate: Change of the heading, radians per second, counter-clockwise; always derived.
         derived: Whether the velocity is derived.
     """
@@ -55,7 +60,9 @@ def motion_of(times_us: NDArray[np.int64], members: MemberColumns, tracks: Seque
     derived = np.isnan(members.vx) & ~np.isnan(x)
     vx, vy = np.where(derived, x, members.vx), np.where(derived, y, members.vy)
     sine, cosine = np.sin(members.heading), np.cos(members.heading)
-    acceleration = steps.rate(vy) * cosine - steps.rate(vx) * sine
+    backwards = vy * cosine - vx * sine < 0
+    speed = np.where(np.isnan(members.heading), np.nan, np.hypot(vx, vy) * np.where(backwards, -1.0, 1.0))
+    acceleration = _slopes(times_us, speed, tracks)
     return MotionColumns(vx, vy, acceleration, steps.rate(members.heading, turns=True), derived)
 
 
@@ -99,3 +106,38 @@ class _Steps:
         ahead, behind = values[last] - values, values - values[first]
         change = normalize_array(ahead) + normalize_array(behind) if turns else values[last] - values[first]
         return np.divide(change, seconds, out=np.full(len(values), np.nan), where=seconds > 0)
+
+
+def _slopes(times_us: NDArray[np.int64], values: Numbers, tracks: Sequence[str | None]) -> Numbers:
+    """Least-squares slopes of values over the samples around each, a second; nan where a track has too few samples.
+
+    The samples are those of the track that have a value, equally many on both sides, as long as there are any.
+    """
+    known = np.flatnonzero(~np.isnan(values))
+    track = track_numbers(tracks)[known]
+    order = known[np.argsort(track, kind="stable")]
+    times, speeds = times_us[order] / 1e6, values[order]
+    gap = np.diff(times_us[order])
+    whole = (np.diff(np.sort(track, kind="stable")) == 0) & (gap > 0) & (gap <= LONGEST_GAP_US)
+    stretch = np.concatenate(([0], np.cumsum(~whole)))[: len(order)]
+    first = np.searchsorted(stretch, stretch, side="left")
+    last = np.searchsorted(stretch, stretch, side="right") - 1
+    found = np.full(len(values), np.nan)
+    place = np.arange(len(order))
+    # sums over the samples of each window: one, t, t^2, v and t * v, with t from the middle sample for precision
+    sums = np.stack([np.ones(len(order)), *np.zeros((2, len(order))), speeds, np.zeros(len(order))])
+    low, high = place.copy(), place.copy()
+    while len(place):
+        for step, end in ((-1, first[place]), (1, last[place])):
+            reached = low if step < 0 else high
+            more = np.flatnonzero(reached != end)
+            reached[more] += step
+            t, v = times[reached[more]] - times[place[more]], speeds[reached[more]]
+            sums[:, more] += np.stack([np.ones(len(more)), t, t * t, v, t * v])
+        count, t, square, v, product = sums
+        enough = (count >= FITTED_SAMPLES) & (times[high] - times[low] >= FITTED_S - 1e-6)
+        slope = (count * product - t * v)[enough] / (count * square - t * t)[enough]
+        found[order[place[enough]]] = slope
+        going_on = ~enough & ((low > first[place]) | (high < last[place]))
+        place, low, high, sums = place[going_on], low[going_on], high[going_on], sums[:, going_on]
+    return found

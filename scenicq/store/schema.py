@@ -32,10 +32,10 @@ ArrowTable: TypeAlias = Any
 ArrowArray: TypeAlias = Any
 """A `pyarrow.Array`."""
 
-SCHEMA_VERSION = 4
+SCHEMA_VERSION = 5
 """Changes with every change of a table that a reader could notice."""
 
-UPGRADABLE = frozenset({2, 3})
+UPGRADABLE = frozenset({2, 3, 4})
 """Older versions of which `scenicq index` makes this one: it computes anew what is computed."""
 
 ADDED = {4: frozenset({"z", "pitch", "roll", "image_width", "image_height", "intrinsics", "camera_pose"})}

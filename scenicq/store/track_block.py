@@ -108,6 +108,7 @@ class TrackBlock:
         self._said: tuple[NDArray[np.int64], list[Mapping[str, Any]]] | None = None
         self._categories: tuple[NDArray[np.int64], list[str]] | None = None
         self._tracks: Integers | None = None
+        self._id_ranks: Integers | None = None
 
     def _track_rows(self, starts: Integers, rows: Integers, reach: TrackReach | None) -> Integers:
         """The rows of the label objects of the tracks of some, as far as they are asked about.
@@ -291,6 +292,14 @@ class TrackBlock:
         order = np.empty(len(names) + 1, np.int64)
         order[np.argsort(names, kind="stable")] = np.arange(len(names))
         return order[self.tracks(members) % max(len(names), 1)]
+
+    def id_ranks(self) -> Integers:
+        """By member the place of its id among all ids of the block, as texts; shape (m + n + 1,)."""
+        if self._id_ranks is None:
+            names = np.array([*self._objects.texts("id", self._rows), "ego"], dtype=object)
+            ranks = np.unique(names, return_inverse=True)[1].astype(np.int64)
+            self._id_ranks = np.concatenate((ranks[:-1], np.full(len(self), ranks[-1]), [-1]))
+        return self._id_ranks
 
     def mates(self, wanted: Integers) -> Integers:
         """The members of some tracks, in order; `wanted` are track numbers in order, each once."""

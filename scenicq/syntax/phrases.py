@@ -16,9 +16,9 @@ from typing import TypeVar
 from scenicq.syntax.precedence import ALONG, AT, IMPLIES, POWER, PREFIX, PRODUCT, RELATIVE, UNION, UNTIL
 
 __all__ = [
-    "ALWAYS", "BOX_PARTS", "DEG", "FACING", "IMPLICATION", "INFIXES_AT", "INFIX_NAMES", "INFIX_WORDS", "OPERATORS",
-    "PREFIXES_AT", "RELATION", "SPECIFIERS", "SPECIFIERS_AT", "TEMPORAL", "VECTOR", "VERSIONS", "Operand", "PhraseRow",
-    "each_meaning",
+    "ALWAYS", "BOX_PARTS", "CAN_SEE", "DEG", "FACING", "IMPLICATION", "INFIXES_AT", "INFIX_NAMES", "INFIX_WORDS",
+    "OPERATORS", "PREFIXES_AT", "RELATION", "SPECIFIERS", "SPECIFIERS_AT", "TEMPORAL", "VECTOR", "VERSIONS", "Operand",
+    "PhraseRow", "each_meaning",
 ]  # fmt: skip
 
 Meaning = TypeVar("Meaning")
@@ -210,6 +210,7 @@ _ROWS = {row.text: row for row in (*SPECIFIERS, *OPERATORS)}
 FACING, DEG, VECTOR = _ROWS["facing {heading}"], _ROWS["{value} deg"], _ROWS["{x} @ {y}"]
 RELATION, IMPLICATION = _ROWS["{left} relative to {right}"], _ROWS["{left} implies {right}"]
 ALWAYS = _ROWS["always {condition}"]
+CAN_SEE = _ROWS["{viewer} can see {target}"]
 TEMPORAL = tuple(row for row in OPERATORS if row.versions is _RECENT and row is not IMPLICATION)
 
 SPECIFIERS_AT = _by_word(SPECIFIERS)

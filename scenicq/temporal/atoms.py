@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.budget import look
+from scenicq.forest.among import LabelElements, among_column, joined, taken
 from scenicq.forest.clear_columns import QuickColumns, quick_form
 from scenicq.forest.column_domain import ColumnDomain, first_direction
 from scenicq.forest.columns import DEFINED, UNDEFINED, Coded, Column, arrays_of, column_of, constant_column, truth_of
@@ -22,7 +23,7 @@ from scenicq.forest.columns import UNKNOWN as UNOBSERVED
 from scenicq.forest.condition import expand
 from scenicq.forest.ego_frame import DISTANCE, PLACE
 from scenicq.forest.interpret import OnMap, Steps, interpret, steps_of
-from scenicq.forest.nodes import DirectionAt, Feature, Identity, Leaf, Node, Value
+from scenicq.forest.nodes import Among, DirectionAt, Feature, Identity, Leaf, Node, Value
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.temporal import Atom
 from scenicq.forest.unobserved import certain_and_possible
@@ -88,20 +89,23 @@ class AtomColumns:
     undecided: list[NDArray[np.bool_]] = field(default_factory=list["NDArray[np.bool_]"])
     _features: dict[tuple[int, str], Column | None] = field(default_factory=dict["tuple[int, str]", "Column | None"])
     _looked_up: dict[int, _LookedUp] = field(default_factory=dict["int", "_LookedUp"])
+    _elements: list[tuple[int, int, LabelElements | None]] = field(
+        default_factory=list["tuple[int, int, LabelElements | None]"]
+    )
     _readings: dict[int, tuple[Node, NDArray[np.int64]]] = field(default_factory=dict["int", "tuple[Node, Any]"])
 
     def assigned(self, assignment: Mapping[Identity, Value]) -> AtomColumns:
         """The same with values of random variables; what is observed, and the map's answers about it, are shared."""
         return AtomColumns(
             self.scenario, self.samples, assignment, self.start, self.given, self.undecided, self._features,
-            self._looked_up,
+            self._looked_up, self._elements,
         )  # fmt: skip
 
     def assuming(self, given: Mapping[int, Column]) -> AtomColumns:
         """The same with values of some nodes, by their ids; what is observed is shared."""
         return AtomColumns(
             self.scenario, self.samples, self.assignment, self.start, given, self.undecided, self._features,
-            self._looked_up,
+            self._looked_up, self._elements,
         )  # fmt: skip
 
     def expanded(self, condition: Node) -> Node:
@@ -281,7 +285,7 @@ class AtomColumns:
             counts[id(node)] = allowed
             return np.full(1, chosen.get(id(node), 0))
 
-        domain = ColumnDomain(self._observed, self._assigned, pick)
+        domain = ColumnDomain(self._observed, self._assigned, pick, others=self._others)
         with np.errstate(all="ignore"):
             if not self.assignment:
                 return interpret(steps_of(root, known=self.given), domain, self.given)[id(root)]
@@ -306,13 +310,13 @@ class AtomColumns:
             several.add(id(node))
             return np.zeros(1, np.intp)
 
-        known = interpret(steps, ColumnDomain(self._observed, self._assigned, pick))
+        known = interpret(steps, ColumnDomain(self._observed, self._assigned, pick, others=self._others))
         given: dict[int, Column] = {}
         for node, below in steps:
             # each of several directions is tried
             if id(node) in several or any(id(each) in several for each in below):
                 several.add(id(node))
-            elif isinstance(node, OnMap):
+            elif isinstance(node, OnMap | Among):
                 given[id(node)] = known[id(node)]
         return _LookedUp(root, steps_of(root, known=given), given)
 
@@ -320,6 +324,22 @@ class AtomColumns:
         if leaf.identity not in self.assignment:
             raise UnclearVariable("a hidden random variable over time")
         return constant_column(self.assignment[leaf.identity])
+
+    def _others(self, node: Among, inputs: Sequence[Column]) -> Column:
+        """What holds of the label objects of each sample; unknown where the samples are of one binding alone."""
+        samples = self.samples
+        if not isinstance(samples, BoundSamples) or not len(samples):
+            return Column(np.full(1, np.nan), np.full(1, UNOBSERVED))
+        if not self._elements:
+            self._elements += samples.pieces()
+        found: list[Column] = []
+        for first, end, elements in self._elements:
+            look()
+            # those of many samples are not kept
+            there = elements or samples.at(np.arange(first, end)).elements()
+            mine = [each if _is_one(each) else _piece(each, first, end, len(samples)) for each in inputs]
+            found.append(among_column(node, mine, there))
+        return found[0] if len(found) == 1 else joined(found)
 
     def _observed_at(self, node: Feature, samples: NDArray[np.int64]) -> Column:
         """What is observed of a feature at some samples."""
@@ -351,6 +371,17 @@ class AtomColumns:
                 status = np.where(np.isnan(seen[0]), UNOBSERVED, DEFINED)
                 self._features[key] = Column((seen[0], seen[1]) if len(seen) == 2 else seen[0], status)
         return self._features[key]
+
+
+def _is_one(column: Column) -> bool:
+    """Whether a column has one value for all places."""
+    return all(part.size == 1 for part in (*arrays_of(column.data), column.status))
+
+
+def _piece(column: Column, first: int, end: int, n: int) -> Column:
+    """A column of n places at some of them."""
+    rows = np.arange(first, end)
+    return Column(taken(column.data, rows, n), np.broadcast_to(column.status, n)[rows])
 
 
 def _as_truth(found: Column, count: int) -> Truth:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from scenicq.budget import look
 from scenicq.errors import Span
+from scenicq.forest.among import asked_of_others
 from scenicq.forest.condition import expand
 from scenicq.forest.nodes import Node
 from scenicq.forest.scenario import Scenario
@@ -145,6 +146,8 @@ class IntervalMatcher:
     def reach(self) -> TrackReach | None:
         """How much of the tracks of starts matters; None for all that follows."""
         dynamics = self.scenario.dynamics
+        if asked_of_others(self.scenario) is not None:
+            return None
         if dynamics is None:
             return TrackReach(0.0, self.options.gap_s, gaps=True)
         limit_s = dynamics.time_limit_s
@@ -172,7 +175,7 @@ class IntervalMatcher:
             def remembered(number: int, which: NDArray[np.int64] = which) -> Remembered:
                 return remember(int(order[which[number]]))
 
-            for stretches in stretches_of(own, self.options.gap_s, apart=program.apart):
+            for stretches in stretches_of(own, self.options.gap_s, apart=program.apart, classes=self.match.classes):
                 for some, runs in self._followed(program, stretches, own, remembered):
                     parts.append(runs.at(which[some.numbers], some.labels))
         if not parts:

@@ -4,30 +4,38 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
+from itertools import pairwise
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from scenicq.forest.among import LabelElements
+from scenicq.forest.columns import DEFINED, UNKNOWN, Column, column_of
 from scenicq.forest.ego_frame import PLACE
-from scenicq.forest.nodes import Value
+from scenicq.forest.nodes import IDENTITY, RANK, TRACK, Value
+from scenicq.store.classes import Granularity, class_truth
 from scenicq.store.track_block import TrackBlock
 from scenicq.store.tracks import RecordingTracks, TrackKey
 
 __all__ = ["FIXED", "MOVING", "WITH_COLUMNS", "Binding", "BoundSamples", "Observed", "Samples"]
 
-MOVING = frozenset({"position", "heading", "velocity", "speed", "angularSpeed", "acceleration"})
+_WHO = frozenset({IDENTITY, TRACK, RANK})
+MOVING = _WHO | {"position", "heading", "velocity", "speed", "angularSpeed", "acceleration"}
 """Properties that change from sample to sample: where they are not observed, nothing is known of them."""
 
 FIXED = frozenset({"width", "length", "height"})
 """Properties that are the same at each sample."""
 
+_AT_ONCE = 200_000
+"""Label objects in memory of whom something is asked."""
 _COLUMNS = {
     "heading": "heading", "width": "width", "length": "length", "height": "height",
     "angularSpeed": "yaw_rate", "acceleration": "acceleration",
 }  # fmt: skip
 
-WITH_COLUMNS = MOVING | _COLUMNS.keys()
+WITH_COLUMNS = (MOVING - _WHO) | _COLUMNS.keys()
 """Properties that the store has columns of."""
 
 Binding = Mapping[int, TrackKey]
@@ -59,11 +67,15 @@ class BoundSamples:
         block: The recordings.
         members: By object of the scenario, who plays it at each place; -1 where it is not observed.
         size: How many places there are.
+        labels: The label of each place; None where somebody is observed at each.
+        classes: How classes are compared.
     """
 
     block: TrackBlock
     members: Mapping[int, NDArray[np.int64]]
     size: int
+    labels: NDArray[np.int64] | None = None
+    classes: Granularity = "fine"
 
     def __len__(self) -> int:
         """The number of places."""
@@ -72,6 +84,10 @@ class BoundSamples:
     def observed(self, index: int, name: str) -> tuple[Numbers, ...] | list[Value] | None:
         """See `Observed`."""
         mine = self.members[index]
+        if name in _WHO:
+            who = (self.block.id_ranks() if name == RANK else self.block.tracks(np.arange(self.block.size)))[mine]
+            # where it is not there, nobody is it
+            return (np.where(mine >= 0, who.astype(np.float64), -1.0 if name == TRACK else np.nan),)
 
         def said() -> list[Value]:
             codes, answers = self.block.said()
@@ -96,7 +112,69 @@ class BoundSamples:
         """Some of the places, by their numbers or a truth value for each."""
         members = {index: mine[chosen] for index, mine in self.members.items()}
         size = int(chosen.sum()) if chosen.dtype == np.bool_ else len(chosen)
-        return BoundSamples(self.block, members, size)
+        labels = None if self.labels is None else self.labels[chosen]
+        return BoundSamples(self.block, members, size, labels, self.classes)
+
+    def elements(self) -> LabelElements:
+        """All label objects of the label of each place, whether or not they play a role."""
+        return label_elements(self.block, self._labels(), self.classes)
+
+    def pieces(self) -> list[tuple[int, int, LabelElements | None]]:
+        """From where to where places have not too many label objects, and these, where all are one piece."""
+        counts = np.cumsum(np.append(np.diff(self.block.object_starts), 0)[self._labels()] + 1)
+        cuts = [0]
+        while cuts[-1] < self.size:
+            before = int(counts[cuts[-1] - 1]) if cuts[-1] else 0
+            cuts.append(max(cuts[-1] + 1, int(np.searchsorted(counts, before + _AT_ONCE, side="right"))))
+        if len(cuts) == 2:
+            return [(0, self.size, self.elements())]
+        return [(first, end, None) for first, end in pairwise(cuts)]
+
+    def _labels(self) -> NDArray[np.int64]:
+        if self.labels is not None:
+            return self.labels
+        return np.max([np.where(mine >= 0, self.block.label_of[mine], -1) for mine in self.members.values()], 0)
+
+
+def label_elements(block: TrackBlock, labels: NDArray[np.int64], classes: Granularity) -> LabelElements:
+    """The label objects of some labels, place by place, the egos that are there among them.
+
+    Args:
+        block: Has all of them.
+        labels: The label of each place, -1 where it is not known.
+        classes: How classes are compared.
+    """
+    counts = np.where(labels >= 0, np.diff(block.object_starts)[labels], 0)
+    ends = np.cumsum(counts)
+    place = np.repeat(np.arange(len(labels)), counts)
+    objects = np.arange(int(counts.sum())) - np.repeat(ends - counts - block.object_starts[labels], counts)
+    egos = np.where(labels >= 0, block.present_ego(labels), -1)
+    with_ego = np.flatnonzero(egos >= 0)
+    members = np.concatenate((objects, egos[with_ego]))
+    place = np.concatenate((place, with_ego))
+    order = np.argsort(place, kind="stable")
+    members, place = members[order], place[order]
+    codes, names = block.categories()
+
+    @cache
+    def belongs(category: str) -> NDArray[np.int8]:
+        truths = [*(class_truth(category, name, classes) for name in names), 0]
+        return np.array(truths, dtype=np.int8)[codes[members]]
+
+    rows = BoundSamples(block, {0: members}, len(members))
+
+    @cache
+    def observed(name: str) -> Column:
+        found = rows.observed(0, name)
+        if found is None:
+            return Column(np.full(1, np.nan), np.full(1, UNKNOWN))
+        if isinstance(found, list):
+            return column_of(found)
+        status = np.where(np.isnan(found[0]), UNKNOWN, DEFINED)
+        return Column((found[0], found[1]) if len(found) == 2 else found[0], status)
+
+    ids = block.tracks(members).astype(np.float64)
+    return LabelElements(place.astype(np.intp), labels >= 0, ids, belongs, observed)
 
 
 @dataclass(eq=False, slots=True)

@@ -181,7 +181,9 @@ class StartSearch:
                 chosen = np.flatnonzero(may[role] & ~out[place])
                 where = place[chosen]
                 members = {scenario.ego: block.ego(label_of[chosen]), role: candidates.members[chosen]}
-            holds, first_broken = self._plain(BoundSamples(block, members, len(where)), requirements)
+            holds, first_broken = self._plain(
+                BoundSamples(block, members, len(where), classes=self.matcher.options.classes), requirements
+            )
             kept = np.zeros(n, np.bool_)
             kept[where[holds > FALSE]] = True
             sure[where[holds == UNKNOWN]] = False

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from scenicq.store.classes import Granularity
 from scenicq.store.track_block import TrackBlock
 from scenicq.temporal.samples import BoundSamples
 
@@ -141,13 +142,14 @@ class Stretches(Timeline):
         return self.beginning(number).some(np.arange(first, end))
 
 
-def stretches_of(table: StartTable, gap_s: float, *, apart: bool) -> Iterator[Stretches]:
+def stretches_of(table: StartTable, gap_s: float, *, apart: bool, classes: Granularity = "fine") -> Iterator[Stretches]:
     """The stretches that starts make, so many at a time that they stay in memory.
 
     Args:
         table: Starts, sorted by binding, then by label; no two objects of one play the same track.
         gap_s: Seconds without a label after which a track's life ends.
         apart: Whether each start makes a stretch of its own.
+        classes: How classes are compared.
     """
     if not len(table):
         return
@@ -175,7 +177,7 @@ def stretches_of(table: StartTable, gap_s: float, *, apart: bool) -> Iterator[St
         starts = bounds[mine] + labels[low:high] - labels[heads[first + mine]]
         recordings = np.array([run[0] for run in block.runs], dtype=np.int64)[block.recording_of[at]]
         seconds = (block.times_us[at] - block.times_us[recordings]) / 1e6
-        places = BoundSamples(block, members, len(at))
+        places = BoundSamples(block, members, len(at), at, classes)
         yield Stretches(bounds, seconds, starts, places, at, np.arange(low, high))
         first = last
 

@@ -347,6 +347,17 @@ SELECT DISTINCT a.frame FROM objects a JOIN near USING (frame)
 WHERE a.class = 'Car' AND a.ego_distance < 20 AND along(a.heading, a.road_directions, radians(5))
 AND {_near("a.frame", "a.id", DRIVABLE)}""",
     ),
+    "nobody near": _driving(
+        "from scenicq.labels import others\nrequire not any((distance to c) < 15 for c in others(Car))",
+        """
+SELECT frame FROM ego WHERE frame NOT IN (SELECT frame FROM objects a WHERE a.class = 'Car' AND a.ego_distance < 15)""",
+    ),
+    "three on foot": _driving(
+        "from scenicq.labels import count\nrequire count(Pedestrian, within=CircularRegion(ego, 30)) >= 3",
+        """
+SELECT a.frame FROM objects a JOIN ego USING (frame) WHERE a.class = 'Adult' AND a.ego_distance <= 30
+GROUP BY a.frame HAVING count(*) >= 3""",
+    ),
     "two in one intersection": _driving(
         "one = new Car in intersection, facing Range(-180, 180) deg\n"
         "two = new Truck in intersection, facing Range(-180, 180) deg\n"

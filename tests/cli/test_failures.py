@@ -116,6 +116,7 @@ WAYS = {
         "smt",
         "--solver",
         "portable",
+        "--exit-zero",
     ),
     "ingest": ("ingest", PROGRAM.parents[1] / "crossroads", "made", "-q"),
     "info": ("info", "DATASET", "--verify"),

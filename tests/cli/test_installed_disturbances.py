@@ -45,7 +45,7 @@ def mirrored(label):
 
 @pytest.mark.parametrize("way", [("--jobs", "2"), ("--jobs", "1"), ("--jobs", "1", "--resume")])
 @pytest.mark.parametrize("how", ["ingest over it", "swap"])
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(24)
 def test_rows_are_of_the_dataset_that_was_asked_about(way, how, command, crossroads, tmp_path):
     """It is replaced at a random moment; results are of the old one, or there are none."""
     other = changed_sample(tmp_path / "other", renamed)
@@ -79,7 +79,7 @@ def test_rows_are_of_the_dataset_that_was_asked_about(way, how, command, crossro
     ("explain", PROGRAM, "TOWN", "03-busy-intersection/09"),
     ("match", PROGRAM, "TOWN", "--export", "interchange", "out"),
 ], ids=lambda what: " ".join(map(str, what[:1])))  # fmt: skip
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(6)
 def test_a_dataset_that_is_removed_meanwhile_is_told_in_one_diagnostic(what, command, crossroads, tmp_path):
     chance = random.Random(str(what[0]))
     for number in range(4):
@@ -101,7 +101,7 @@ def test_a_dataset_that_is_removed_meanwhile_is_told_in_one_diagnostic(what, com
 
 @pytest.mark.skipif(sys.platform == "win32", reason="links need rights there")
 @pytest.mark.parametrize("name", NAMES)
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(8)
 def test_nothing_is_written_through_a_link(name, command, crossroads, tmp_path):
     dataset, outside = tmp_path / "d", tmp_path / "outside"
     shutil.copytree(crossroads, dataset)

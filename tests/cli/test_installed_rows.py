@@ -16,7 +16,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "importers"))
 
 from full_sources import FORMATS, entries, full
 
-from scenicq_cli.cache import user_cache
+from scenicq_cli.user_folders import user_cache
 
 SAMPLES = Path(__file__).parents[2] / "sample_data"
 A = "in everywhere, facing Range(0, 360) deg"
@@ -139,6 +139,7 @@ time.time = lambda: wall() + {hours} * 3600 * next(jumps)
 
 
 @pytest.mark.parametrize("hours", [1, -1])
+@pytest.mark.one_in(2)
 def test_a_clock_that_is_set_ends_no_run_and_keeps_none_alive(hours, asked, tmp_path):
     """The wall's clock jumps an hour whenever it is read."""
     (tmp_path / "sitecustomize.py").write_text(JUMPING.format(hours=hours))
@@ -157,6 +158,7 @@ ASCII = {"PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", "LC_ALL": "C"}
 
 @pytest.mark.parametrize("form", ["openlabel", "interchange", "paths"])
 @pytest.mark.parametrize("env", [{}, ASCII], ids=["usual", "ascii"])
+@pytest.mark.one_in(3)
 def test_long_names_in_any_script_are_exported_or_refused_once(form, env, asked, tmp_path):
     done = asked(CARS, "match", "{program}", "{dataset}", "--export", form, tmp_path / "out", env=env)
     if env and form == "interchange":  # its files are called as its maps are
@@ -172,6 +174,7 @@ def test_long_names_in_any_script_are_exported_or_refused_once(form, env, asked,
     ("sample", "{program}", "{dataset}", "--map", "straße", "-n", "1", "-o"),
     ("match", "{program}", "{dataset}", "--report"), ("show", "{dataset}", "@c-0", "-o"),
 ])  # fmt: skip
+@pytest.mark.one_in(3)
 def test_whoever_writes_works_or_refuses_once_in_any_locale(words, asked, tmp_path):
     done = asked(CARS, *words, tmp_path / "out.svg", env=ASCII)
     assert "internal error" not in done.stderr
@@ -180,6 +183,7 @@ def test_whoever_writes_works_or_refuses_once_in_any_locale(words, asked, tmp_pa
 
 
 @pytest.mark.parametrize("format_", FORMATS)
+@pytest.mark.one_in(3)
 def test_every_format_whole(format_, command, tmp_path, monkeypatch):
     """What holds all that its specification lists is ingested; what is left out of it is told by its name."""
     source = tmp_path / "source"

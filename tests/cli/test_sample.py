@@ -103,6 +103,7 @@ def test_the_forest_and_its_groups_are_shown(run, tmp_path):
     assert "1. ego.position" in groups
 
 
+@pytest.mark.slow
 def test_what_geometry_cannot_tell_is_said_not_counted_as_no_scene(run, tmp_path):
     program = tmp_path / "endless.scenic"
     program.write_text(

@@ -300,7 +300,7 @@ def usual(command, program, crossroads, tmp_path_factory):
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="the system has no /dev/full")
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize(("what", "stream", "kind"), [(what, *odd) for what in ALL_COMMANDS for odd in ODD])
-@pytest.mark.one_in(4 * len(ODD) + 1)
+@pytest.mark.one_in(3 * (4 * len(ODD) + 1))
 def test_an_odd_stream_is_told_or_makes_no_difference(what, stream, kind, usual, tmp_path):
     start, words, run = usual
     code, data, told, files = run(what)

@@ -80,6 +80,7 @@ def test_what_one_course_lacks_excludes_it_alone():
         compiled("require [1, 2][5] == 1 if cars[1].speed > 3 else [1, 2][6] == 1\n")
 
 
+@pytest.mark.slow
 def test_too_many_courses_are_refused():
     with pytest.raises(ScenarioError) as error:
         compiled("many = cars * 6\nrequire sorted(many, key=lambda o: o.speed)[0].speed > 1\n")

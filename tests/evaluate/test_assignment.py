@@ -41,6 +41,7 @@ def one_by_one(predictions: Centres, objects: Centres, threshold: float, *, near
 @pytest.mark.parametrize("spatial", [False, True])
 @pytest.mark.parametrize("nearest_only", [False, True])
 @pytest.mark.parametrize("seed", range(20))
+@pytest.mark.one_in(4)
 def test_the_same_as_one_after_the_other(seed: int, nearest_only: bool, spatial: bool) -> None:
     rng = np.random.default_rng(seed)
     predictions, objects = centres(rng, 60, spatial=spatial), centres(rng, 40, spatial=spatial)

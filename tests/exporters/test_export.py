@@ -251,6 +251,7 @@ def test_openlabel_holds_what_is_known_and_counts_the_rest(tmp_path: Path) -> No
     ids=["long", "3 bytes", "4 bytes", "mixed", "odd"],
 )
 @pytest.mark.parametrize("kind", ["openlabel", "interchange", "paths"])
+@pytest.mark.one_in(3)
 def test_names_may_be_long(kind: str, name: str, tmp_path: Path) -> None:
     """The name of a file is no longer than systems take, whatever recordings and frames are called."""
     source = Path(shutil.copytree(SAMPLES / "crossroads", tmp_path / "source"))

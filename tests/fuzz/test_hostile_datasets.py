@@ -50,6 +50,7 @@ def test_what_no_reader_expects_is_refused(kind, hostile):
 
 
 @pytest.mark.parametrize("kind", SOME)
+@pytest.mark.one_in(2)
 def test_a_damaged_dataset_opens_or_is_refused(kind, hostile):
     folder = hostile(kind)
     if folder:

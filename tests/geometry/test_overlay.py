@@ -24,9 +24,10 @@ ELSEWHERE = {"geometry/shapes.py", "importers/opendrive_worker.py"}
 def test_all_of_scenicq_goes_through_them():
     root = Path(scenicq.__file__).parent
     for path in root.rglob("*.py"):
-        if path.relative_to(root).as_posix() in ELSEWHERE:
+        text = path.read_text(encoding="utf-8")
+        if "shapely" not in text or path.relative_to(root).as_posix() in ELSEWHERE:
             continue
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in ast.walk(ast.parse(text)):
             if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == "shapely":
                 assert node.attr not in OVERLAYS, (path, node.lineno)
             if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("shapely"):
@@ -50,6 +51,7 @@ def crooked(rng: random.Random) -> shapely.Polygon:
 
 
 @pytest.mark.parametrize("name", OPERATIONS)
+@pytest.mark.one_in(3)
 def test_they_have_a_result_for_polygons_that_cross_themselves(name):
     rng = random.Random(name)
     for _ in range(300):

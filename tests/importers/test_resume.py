@@ -86,6 +86,7 @@ def contents(dataset: Path) -> dict[str, bytes]:
     return files | {MANIFEST: json.dumps(manifest).encode()}
 
 
+@pytest.mark.slow
 def test_the_number_of_processes_does_not_matter(source: Path, tmp_path: Path) -> None:
     for jobs in (1, 2, 3):
         ingest(source, tmp_path / f"d{jobs}", jobs=jobs, segment_objects=SEGMENT)
@@ -95,6 +96,7 @@ def test_the_number_of_processes_does_not_matter(source: Path, tmp_path: Path) -
     assert contents(tmp_path / "d3") == first
 
 
+@pytest.mark.slow
 def test_labels_do_not_depend_on_the_parts(source: Path, tmp_path: Path) -> None:
     ingest(source, tmp_path / "many", segment_objects=SEGMENT)
     ingest(source, tmp_path / "one")
@@ -216,6 +218,7 @@ def test_finished_recordings_are_not_done_again(source: Path, tmp_path: Path) ->
 
 @pytest.mark.skipif(os.name != "posix", reason="signals")
 @pytest.mark.parametrize("how", ["force", "other source", "other options"])
+@pytest.mark.one_in(3)
 def test_what_a_killed_ingest_left_is_discarded(source: Path, tmp_path: Path, how: str) -> None:
     killed(source, tmp_path / "d", 20)
     if how == "force":
@@ -362,6 +365,7 @@ def test_an_interrupted_update_changes_nothing(source: Path, tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
+@pytest.mark.one_in(2)
 def test_a_frame_name_that_two_recordings_use(source: Path, tmp_path: Path, jobs: int) -> None:
     text = (source / "labels.jsonl").read_text()
     (source / "labels.jsonl").write_text(text.replace('"id": "r20/05"', '"id": "r02/07"'))

@@ -31,6 +31,7 @@ def labels_of(source: Path, target: Path):
     ["kitti_tiny", "interaction_tiny", "openlabel_tiny", "nuscenes_tiny", "crossroads", "commonroad_tiny",
      "forecasting_tiny"],
 )  # fmt: skip
+@pytest.mark.one_in(3)
 def test_a_byte_order_mark_changes_nothing(name: str, tmp_path: Path) -> None:
     plain, _ = labels_of(SAMPLES / name, tmp_path / "plain")
     source = copy(name, tmp_path)

@@ -69,7 +69,7 @@ def test_frames_that_a_broken_solver_decides_are_as_ever_and_the_others_are_name
     monkeypatch.syspath_prepend(str(HERE))
     monkeypatch.setattr(solver, "DREAL", "mixed_checks:check")
     monkeypatch.setattr(worker_solver, "GRACE_S", 0.05)
-    found = verdicts("--solver", "dreal", "--timeout", "0.5")
+    found = verdicts("--solver", "dreal", "--timeout", "0.2")
     assert found.keys() == honest.keys()
     unknown = {frame: reason_of(row) for frame, row in found.items() if row["verdict"] == "unknown"}
     assert all(found[frame]["verdict"] == honest[frame]["verdict"] for frame in found.keys() - unknown.keys())

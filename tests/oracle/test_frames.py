@@ -14,12 +14,12 @@ from frames_attack import ALL, WAYS, dataset_of, differences
 
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.one_in(3)
-def test_every_way_says_what_the_definition_says(seed, tmp_path):
+def test_every_way_says_what_the_definition_says(seed, tmp_path, rounds):
     counts: Counter[str] = Counter()
     chance = random.Random(f"labels {seed}")
     scenes = [random_scene(chance) for _ in range(25)]
     dataset = dataset_of(scenes, tmp_path / "d")
-    for number in range(8):
+    for number in range(2 * rounds(8)):
         program = Maker(random.Random(f"frames-{seed}-{number}")).program()
         assert differences(program, scenes, dataset, (*WAYS, ALL), f"{seed}", counts) == [], program.text
     for way in WAYS:

@@ -68,6 +68,7 @@ def found(dataset, program, **options):
 
 @pytest.mark.parametrize("pair", PAIRS)
 @pytest.mark.parametrize("prefilter", [True, False])
+@pytest.mark.one_in(3)
 def test_plain_words_ask_nothing_of_a_map_that_is_not_there(pair, prefilter, mapless):
     plain, said = (found(mapless, each, prefilter=prefilter) for each in pair)
     assert plain == said
@@ -75,6 +76,7 @@ def test_plain_words_ask_nothing_of_a_map_that_is_not_there(pair, prefilter, map
 
 
 @pytest.mark.parametrize("pair", PAIRS)
+@pytest.mark.one_in(3)
 def test_a_map_is_not_asked_where_the_user_says_so(pair, crossroads):
     dataset = open_dataset(crossroads)
     assert found(dataset, pair[0], map_defaults=False) == found(dataset, pair[1])

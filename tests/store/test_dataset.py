@@ -82,6 +82,7 @@ def test_chosen_frames(tmp_path: Path) -> None:
     assert list(dataset.labels([])) == []
 
 
+@pytest.mark.slow
 def test_many_rows_are_split_into_row_groups_and_joined_again(tmp_path: Path) -> None:
     many = tuple(LabelObject(str(number), "Cone", "cone", 1.0 + number, 0.0) for number in range(700))
     labels = [label(f"f{number:04}", time=number, objects=many[: 500 + number % 200]) for number in range(300)]

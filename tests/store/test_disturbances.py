@@ -57,6 +57,7 @@ def source(tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize("updates", [2, pytest.param(40, marks=pytest.mark.slow)])
+@pytest.mark.slow
 def test_readers_see_one_version_while_recordings_are_added(source: Path, tmp_path: Path, updates: int) -> None:
     names = sorted({json.loads(line)["recording"] for line in (source / "labels.jsonl").read_text().splitlines()})
     versions = [names[:3], names, names[2:]]

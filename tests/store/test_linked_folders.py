@@ -81,6 +81,7 @@ def test_a_dataset_with_a_linked_folder_is_refused_and_untouched(
 
 
 @pytest.mark.parametrize("name", ["", *FOLDERS])
+@pytest.mark.one_in(3)
 def test_nothing_is_written_through_links_where_a_dataset_grows(place: Path, name: str) -> None:
     left = Partial(place / "new").folder
     (place / "outside" / "mine").write_text("mine")

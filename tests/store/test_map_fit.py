@@ -120,6 +120,7 @@ def test_what_fits_is_not_told(tmp_path: Path) -> None:
         ((None, 0.0, -1.0), "headings grow clockwise"),
     ],
 )
+@pytest.mark.one_in(3)
 def test_labels_that_are_changed_are_told(change: tuple[Any, ...], cause: str, tmp_path: Path) -> None:
     (message,) = told(write(tmp_path / "s", *change), tmp_path / "d")
     assert cause in message

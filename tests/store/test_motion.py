@@ -86,9 +86,73 @@ def test_tracks_are_told_apart_whatever_their_order_in_a_label():
 
 def test_acceleration_is_that_along_the_heading():
     # it moves along -x (heading 90 degrees) and slows down from 10 m/s by 2 m/s every second
-    path = [(-10 * t + t * t, 0.0) for t in (0, 0.5, 1, 1.5, 2)]
-    found = motion(columns_of(recording([0, 0.5, 1, 1.5, 2], along(path, heading=math.pi / 2))))
-    assert found.acceleration[2] == pytest.approx(-2.0)
+    times = [0, 0.5, 1, 1.5, 2]
+    seen = along([(-10 * t + t * t, 0.0) for t in times], heading=math.pi / 2)
+    for time, (one,) in zip(times, seen, strict=True):
+        one["velocity"] = (-10 + 2 * time, 0.0)
+    found = motion(columns_of(recording(times, seen)))
+    assert found.acceleration == pytest.approx([-2.0] * 5)
+
+
+def test_an_acceleration_takes_four_samples_and_a_second():
+    for times, there in (
+        ([0, 0.5, 1], False), ([0, 0.1, 0.2, 0.3], False), ([0, 0.5, 1, 1.5], True), ([0, 0.2, 0.4, 0.6, 0.8, 1], True),
+        ([0, 0.5, 2.1, 2.6], False),
+    ):  # fmt: skip
+        found = motion(columns_of(recording(times, along([(0, t * t) for t in times], heading=0.0))))
+        assert (~np.isnan(found.acceleration)).all() == there, times
+        assert (~np.isnan(found.acceleration)).any() == there, times
+
+
+def test_one_slow_step_is_no_braking():
+    # a bus at 5.6 m/s of which one speed at 10 Hz is halved
+    seen = along([(0, 5.6 * n / 10) for n in range(30)], heading=0.0, velocity=(0.0, 5.6))
+    seen[15][0]["velocity"] = (0.0, 2.8)
+    found = motion(columns_of(recording([n / 10 for n in range(30)], seen)))
+    assert np.abs(found.acceleration).max() < 1.6
+    assert found.acceleration[15] == pytest.approx(0.0, abs=1e-9)
+
+
+def fitted(times, speeds, middle):
+    """The slope of a line through the speeds around a sample: as many on both sides as give a second and four."""
+    whole = [0]
+    for number in range(1, len(times)):
+        whole.append(whole[-1] + (round(times[number] - times[number - 1], 6) > 1.5))
+    mine = [number for number in range(len(times)) if whole[number] == whole[middle]]
+    for reach in range(1, len(times)):
+        chosen = [number for number in mine if abs(number - middle) <= reach]
+        seconds = [times[number] for number in chosen]
+        if len(chosen) >= 4 and round(seconds[-1] - seconds[0], 6) >= 1:
+            return np.polyfit(seconds, [speeds[number] for number in chosen], 1)[0]
+    return math.nan
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_accelerations_are_those_of_polyfit(seed):
+    chance = np.random.default_rng(seed)
+    times = np.round(np.cumsum(chance.choice([0.1, 0.25, 0.5, 1.0, 1.75], 40, p=[0.4, 0.2, 0.25, 0.1, 0.05])), 2)
+    count = len(times)
+    headings, ways = chance.uniform(-3, 3, (2, count)), chance.normal(0, 5, (2, 2, count))
+    missing = chance.random((2, count)) < 0.1
+    seen = [
+        [
+            {"x": 0.0, "y": 0.0, "track": "ab"[which], "velocity": tuple(ways[which, :, number]),
+             "heading": None if missing[which, number] else headings[which, number]}
+            for which in chance.permutation(2)
+        ]
+        for number in range(count)
+    ]  # fmt: skip
+    columns = columns_of(recording(times, seen))
+    found = motion(columns).acceleration
+    for which in (0, 1):
+        known = np.flatnonzero(~missing[which])
+        turned = np.arctan2(-ways[which, 0], ways[which, 1]) - headings[which]
+        along_it = np.hypot(*ways[which]) * np.sign(np.cos(turned))
+        expected = np.full(count, np.nan)
+        for place, number in enumerate(known):
+            expected[number] = fitted(times[known], along_it[known], place)
+        mine = [place for place, track in enumerate(columns.objects.track) if track == "ab"[which]]
+        np.testing.assert_allclose(found[mine], expected, atol=1e-6)
 
 
 def test_a_yaw_rate_goes_across_the_seam():
@@ -98,12 +162,13 @@ def test_a_yaw_rate_goes_across_the_seam():
 
 
 def test_labels_from_a_store_carry_it(tmp_path):
-    write_dataset(tmp_path / "d", [recording([0, 0.5, 1.0], along([(0, 0), (0, 2), (0, 8)]))], {}, name="d")
+    seen = along([(0, 0), (0, 2), (0, 8)])
+    write_dataset(tmp_path / "d", [recording([0, 0.5, 1.0], seen)], {}, name="d")
     labels = [*open_dataset(tmp_path / "d").labels()]
     assert [label.objects[0].motion.velocity for label in labels] == [(0.0, 4.0), (0.0, 8.0), (0.0, 12.0)]
     assert all(label.objects[0].motion.derived and label.objects[0].velocity is None for label in labels)
     assert labels[1].ego.motion.velocity == (0.0, 10.0)
-    assert labels[1].ego.motion.acceleration == 0.0
+    assert labels[1].ego.motion.acceleration is None
 
 
 def make_older(folder, version):
@@ -140,7 +205,7 @@ def test_an_older_dataset_is_brought_up_to_date(tmp_path):
     write_dataset(tmp_path / "d", [recording([0, 0.5, 1.0], along([(0, 0), (0, 2), (0, 8)]))], {}, name="d")
     manifest = tmp_path / "d" / "dataset.json"
     before = manifest.read_text()
-    for version in (2, 3):
+    for version in (2, 3, 4):
         make_older(tmp_path / "d", version)
         with pytest.raises(DataError, match=f"version {version}") as refused:
             open_dataset(tmp_path / "d")

@@ -13,6 +13,7 @@ from scenicq.store.writer import write_dataset
 
 
 @pytest.mark.parametrize("there", list(itertools.product([True, False], repeat=4)))
+@pytest.mark.one_in(3)
 def test_no_difference_crosses_a_label_without_an_ego(there: tuple[bool, ...], tmp_path: Path) -> None:
     """An ego has a derived speed exactly where the label before or after has one, too."""
     labels = tuple(

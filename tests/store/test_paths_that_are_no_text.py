@@ -50,6 +50,7 @@ def test_a_source_at_such_a_path_is_read(name: bytes, env: dict[str, str], tmp_p
 
 
 @pytest.mark.parametrize("form", ["jsonl", "csv", "parquet"])
+@pytest.mark.one_in(3)
 def test_results_name_a_program_at_such_a_path(form: str, tmp_path: Path) -> None:
     ingest(SOURCE, tmp_path / "d")
     program = os.fsencode(tmp_path) + b"/n\xff.scenic"

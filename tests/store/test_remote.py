@@ -187,6 +187,7 @@ def test_on_s3(bucket: Any, crossroads: Path, run: Any, monkeypatch: pytest.Monk
     assert refused.stderr.startswith("error[option-invalid]: s3://fleet/town can only be read")
 
 
+@pytest.mark.slow
 def test_two_processes_read_from_s3(bucket: Any, crossroads: Path) -> None:
     bucket.put(str(crossroads), "fleet/again", recursive=True)
     there = Query(open_dataset("s3://fleet/again"), read_program(PROGRAM), replace(OPTIONS, jobs=2))

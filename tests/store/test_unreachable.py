@@ -53,7 +53,7 @@ READING = {
 
 
 @pytest.mark.parametrize("what", READING)
-@pytest.mark.one_in(5)
+@pytest.mark.one_in(10)
 def test_a_dataset_that_is_removed_while_it_is_read(
     what: str, crossroads: Path, tmp_path: Path, run: Any, rounds: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -115,7 +115,7 @@ class NoCredentialsError(Exception):
         (RuntimeError("out of\nsorts"), "cannot be read: out of sorts"),
     ],
 )
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(8)
 def test_what_a_store_says_at_any_request_is_told(
     raised: Exception, words: str, crossroads: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

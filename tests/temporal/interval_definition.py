@@ -367,11 +367,15 @@ def said(program: Program, exchanged: dict[str, str]) -> list[object]:
 def bindings(program: Program, trace: Trace) -> list[dict[str, str]]:
     """Every way to give roles distinct tracks; of roles that nothing tells apart in one order only."""
     tracks = sorted({track for sample in trace for track in sample.seen} - {"ego"})
-    told_apart = said(program, {}) != said(program, {"a": "b", "b": "a"})
-    ways = itertools.permutations if told_apart else itertools.combinations
+    ways = itertools.permutations if tells_apart(program) else itertools.combinations
     return [
         {"ego": "ego", **dict(zip(program.roles, chosen, strict=True))} for chosen in ways(tracks, len(program.roles))
     ]
+
+
+def tells_apart(program: Program) -> bool:
+    """Whether a program says something of one role that it does not say of the other."""
+    return said(program, {}) != said(program, {"a": "b", "b": "a"})
 
 
 def life_end(trace: Trace, binding: dict[str, str], i: int) -> int:

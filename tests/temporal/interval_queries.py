@@ -2,9 +2,10 @@
 
 from pathlib import Path
 
-from interval_definition import Program
+from interval_definition import Program, tells_apart
 
 from scenicq.errors import ScenarioError, Source
+from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.dataset import open_dataset
 
@@ -16,13 +17,21 @@ def found_by_query(folder: Path, program: Program, **options):
     return told
 
 
+def _roles(program: Program, result: Result):
+    """Who plays whom; of two roles that nothing tells apart the first has the first track by name."""
+    roles = dict(sorted(result.verdict.correspondence.items()))
+    if {"a", "b"} <= roles.keys() and not tells_apart(program):
+        roles["a"], roles["b"] = sorted((roles["a"], roles["b"]))
+    return tuple(roles.items())
+
+
 def _found(folder: Path, program: Program, **options):
     """The results of a query; none where no run satisfies the program."""
     query = Query(open_dataset(folder), Source("p.scenic", program.text()), QueryOptions(**options))
     try:
         return [
             (
-                (result.recording, tuple(sorted(result.verdict.correspondence.items())), type(result.verdict).__name__),
+                (result.recording, _roles(program, result), type(result.verdict).__name__),
                 (int(result.frame.rpartition("-")[2]), int(result.interval.last.rpartition("-")[2])),
             )
             for result in query.results()

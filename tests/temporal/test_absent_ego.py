@@ -58,6 +58,7 @@ def told(
         "ego.velocity.y > 20",
     ],
 )
+@pytest.mark.one_in(3)
 def test_what_stands_in_for_an_absent_ego_is_not_read(dataset, condition):
     assert {verdict for verdict, _, _ in told(dataset, f"require eventually {condition}")} == {Unknown}
     kept = told(dataset, f"require always not ({condition})")
@@ -83,7 +84,7 @@ def test_no_motion_crosses_a_label_without_an_ego(dataset):
         else:
             assert motion is not None
             assert motion.velocity == pytest.approx((0.0, 4.0))
-            assert motion.acceleration == pytest.approx(0.0)
+            assert motion.acceleration is None  # which takes four samples without a gap
 
 
 def test_frames_of_a_static_program_without_an_ego_are_in_no_interval_that_matches(dataset):

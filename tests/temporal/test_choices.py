@@ -112,7 +112,10 @@ def found_by_query(folder: Path, program: Program, way: Way) -> Found:
     found = Found()
     for first, last, roles, verdict, why in results(folder, program, way):
         (recording, start), end = first.split("-"), last.rpartition("-")[2]
-        key = recording, tuple(sorted(roles.items())), int(start)
+        who = dict(roles)
+        if {"a", "b"} <= who.keys() and not program.tells_apart():
+            who["a"], who["b"] = sorted((who["a"], who["b"]))
+        key = recording, tuple(sorted(who.items())), int(start)
         if len(roles) <= len(program.roles):
             found.undecided.add((recording, int(start)))
         elif verdict == "match":

@@ -62,6 +62,7 @@ def test_a_match_is_proven_by_its_point(found, crossroads):
             assert max(away[:-1]) <= 40
 
 
+@pytest.mark.slow
 def test_every_end_that_some_point_makes_is_found(crossroads):
     dataset = open_dataset(crossroads)
     options = QueryOptions(solver="portable", time=IntervalOptions(intervals="all"))

@@ -95,6 +95,7 @@ def test_the_start_and_what_follows_say_the_same_of_one_label(alone, start, over
     ],
 )
 @pytest.mark.parametrize("form", ["require {}\nrequire always True\n", "require always ({})\n"])
+@pytest.mark.one_in(3)
 def test_one_condition_says_the_same_of_what_it_reads_twice(alone, form, condition, expected):
     found = verdicts(alone, form.format(condition))
     assert set(found.values()) == ({expected} if expected else set())

@@ -130,7 +130,7 @@ def right(outcome: Outcome, start: int, n: int, *, terminates: bool) -> tuple[in
 
 
 @pytest.mark.parametrize("seed", range(60))
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(16)
 def test_monitors_do_what_their_text_says(seed: int) -> None:
     draw = random.Random(seed)
     body = bodies(draw, itertools.count(1))

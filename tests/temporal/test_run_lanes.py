@@ -203,6 +203,7 @@ STARTS = (
 
 @pytest.mark.parametrize("more", STARTS)
 @pytest.mark.parametrize("prefilter", [False, True])
+@pytest.mark.one_in(3)
 def test_starts_from_arrays_are_the_matchers(tmp_path, monkeypatch, more, prefilter):
     draw = random.Random(5)
     traces = {f"r{number}": random_trace(draw, gaps=True) for number in range(10)}

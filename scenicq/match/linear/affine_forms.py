@@ -11,6 +11,7 @@ from typing import TypeAlias
 
 from scenicq.forest.interpret import OnMap, RegionNode, interpret, steps_of
 from scenicq.forest.nodes import (
+    Among,
     ArithmeticOp,
     CompareOp,
     Feature,
@@ -76,6 +77,9 @@ class _AffineDomain:
         if isinstance(value, float):
             return Affine(value, {})
         return (Affine(value[0], {}), Affine(value[1], {})) if isinstance(value, tuple) else None
+
+    def among(self, node: Among, args: Sequence[_Form]) -> _Form:
+        return None
 
     def feature(self, node: Feature) -> _Form:
         return None

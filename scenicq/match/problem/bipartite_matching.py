@@ -14,7 +14,7 @@ class Slot:
 
     Attributes:
         name: Its index among the objects.
-        candidates: Indices of the candidates that pass its own conditions, ascending.
+        candidates: Indices of the candidates that pass its own conditions, in the order in which they are tried.
     """
 
     name: int

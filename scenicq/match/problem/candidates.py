@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
+from scenicq.forest.among import LabelElements
 from scenicq.forest.nodes import Value
 from scenicq.forest.scenario import Scenario
 from scenicq.limits import LIMITS, exhausted
@@ -14,16 +15,44 @@ from scenicq.match.problem.bipartite_matching import Slot, matchable
 from scenicq.match.problem.constraints import Signature
 from scenicq.match.problem.observation import observe, observe_params
 from scenicq.match.verdict import Cause
-from scenicq.store.classes import class_matches
+from scenicq.store.classes import Granularity, class_matches
 from scenicq.store.labels import Label
 
-__all__ = ["Candidates", "LabelProblem", "candidates_of", "egos", "find_candidates"]
+__all__ = ["Candidates", "LabelProblem", "candidates_of", "egos", "find_candidates", "nearest_first", "ranks"]
 
 Candidates = Mapping[int, tuple[int, ...]]
 """For objects of the scenario, the numbers of the label objects that may play them: all others are excluded."""
 
 
-@dataclass(frozen=True, slots=True)
+def ranks(label: Label, ego: int, candidates: Iterable[Iterable[int]]) -> dict[int, int]:
+    """In which order label objects are tried: the nearest to the ego first, of equally near ones by their ids.
+
+    Args:
+        label: The label.
+        ego: Number of the label object that plays the ego.
+        candidates: Numbers of label objects, for each object of the scenario.
+    """
+    objects = (label.ego, *label.objects)
+    x, y = objects[ego].x, objects[ego].y
+
+    def key(number: int) -> tuple[float, str, int]:
+        each = objects[number]
+        dx, dy = each.x - x, each.y - y
+        return dx * dx + dy * dy, each.id, number
+
+    ordered = sorted({number for numbers in candidates for number in numbers}, key=key)
+    return {number: rank for rank, number in enumerate(ordered)}
+
+
+def nearest_first(label: Label, ego: int, candidates: Candidates) -> Candidates:
+    """Candidates in the order in which they are tried; arguments as of `ranks`."""
+    if all(len(numbers) < 2 for numbers in candidates.values()):
+        return candidates
+    rank = ranks(label, ego, candidates.values()).__getitem__
+    return {index: tuple(sorted(numbers, key=rank)) for index, numbers in candidates.items()}
+
+
+@dataclass(slots=True, eq=False)
 class LabelProblem:
     """A label made ready: its label objects by number (0 is the label's ego) and who may play whom.
 
@@ -32,8 +61,12 @@ class LabelProblem:
         ego: Number of the label object that plays the scenario's ego.
         seen: What is observed of each label object.
         params: What is observed of the frame.
-        candidates: For each object of the scenario but the ego, the numbers of the label objects of its class.
+        candidates: For each object of the scenario but the ego, the numbers of the label objects of its class, in the
+            order in which they are tried.
+        ranks: That order.
         disc: The area that is looked at, if it is limited: centre and radius.
+        classes: How classes are compared.
+        elements: The label objects for conditions that go through all of them, once one has been asked.
     """
 
     label: Label
@@ -41,7 +74,10 @@ class LabelProblem:
     seen: tuple[Mapping[str, Value], ...]
     params: Mapping[str, Value]
     candidates: Mapping[int, tuple[int, ...]]
+    ranks: Mapping[int, int]
     disc: tuple[tuple[float, float], float] | None
+    classes: Granularity = "fine"
+    elements: LabelElements | None = None
 
     def signatures(
         self, relevant: tuple[frozenset[str], ...]
@@ -115,7 +151,10 @@ def find_candidates(
             return Cause("--exact", f"{spare} label objects are left over")
     label_objects = (label.ego, *label.objects)
     disc = None if options.radius is None else ((label_objects[ego].x, label_objects[ego].y), options.radius)
-    return LabelProblem(label, ego, tuple(map(observe, label_objects)), observe_params(label), candidates, disc)
+    order = ranks(label, ego, candidates.values())
+    candidates = {index: tuple(sorted(numbers, key=order.__getitem__)) for index, numbers in candidates.items()}
+    seen = tuple(map(observe, label_objects))
+    return LabelProblem(label, ego, seen, observe_params(label), candidates, order, disc, options.classes)
 
 
 def candidates_of(

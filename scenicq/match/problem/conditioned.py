@@ -13,6 +13,7 @@ from scenicq.forest.condition import Observation, condition
 from scenicq.forest.groups import PARAMS, Comparison, Condition, Constraint, Group
 from scenicq.forest.kinds import kind_of
 from scenicq.forest.nodes import (
+    Among,
     Compare,
     CompareOp,
     Constant,
@@ -102,7 +103,7 @@ def _unobserved(group: Group) -> Mapping[int, Node]:
     largest: dict[int, Node] = {}
     for node in postorder(roots):
         below = children(node)
-        if isinstance(node, Feature) or any(id(child) in observing for child in below):
+        if isinstance(node, Feature | Among) or any(id(child) in observing for child in below):
             observing.add(id(node))
             largest.update((id(child), child) for child in below if children(child) and id(child) not in observing)
     largest.update((id(root), root) for root in roots if id(root) not in observing)

@@ -10,10 +10,11 @@ from collections.abc import Callable, Container, Iterator, Mapping
 from dataclasses import replace
 
 from scenicq.forest import build
+from scenicq.forest.among import asks_others
 from scenicq.forest.collisions import apart, boxes
 from scenicq.forest.condition import expand
 from scenicq.forest.groups import PARAMS, Comparison, Condition, Constraint, Group, group_constraints
-from scenicq.forest.nodes import Feature, Node
+from scenicq.forest.nodes import IDENTITY, RANK, TRACK, Among, Feature, Node
 from scenicq.forest.scenario import BuiltIn, Requirement, Scenario, ScenarioObject
 from scenicq.forest.unobserved import MOTION, certain_and_possible, with_any_value
 from scenicq.forest.walk import features, postorder
@@ -25,6 +26,8 @@ Signature = tuple[frozenset[str], ...]
 """What is observed of each object of the scenario, by index; of the parameters at the end."""
 
 _ALWAYS = ("position", "heading")
+WHO = frozenset({IDENTITY, TRACK, RANK})
+"""What is known of whoever plays a role, whatever a label observes of it."""
 
 
 def relevant_properties(scenario: Scenario, options: MatchOptions) -> tuple[frozenset[str], ...]:
@@ -41,7 +44,7 @@ def relevant_properties(scenario: Scenario, options: MatchOptions) -> tuple[froz
         todo += [(owner.index, name) for name in (*named, *sizes)]
     while todo:
         index, name = todo.pop()
-        if name not in used[index]:
+        if name not in (*WHO, *used[index]):
             used[index].add(name)
             given = scenario.objects[index].properties.get(name)
             todo += features(given.value) if given is not None else ()
@@ -55,7 +58,7 @@ def _definition(scenario: Scenario, signature: Signature, feature: Feature, *, n
     """
     owner = scenario.objects[feature.object]
     hidden = feature.property in owner.mutated and not noisy
-    if feature.property in MOTION or (feature.property in signature[feature.object] and not hidden):
+    if feature.property in (*MOTION, *WHO) or (feature.property in signature[feature.object] and not hidden):
         return None
     return owner.properties[feature.property].value
 
@@ -105,13 +108,15 @@ def build_groups(scenario: Scenario, signature: Signature, options: MatchOptions
             requirement = apart(scenario, frames, first, second)
             found.append(Condition(requirement, after_noise(requirement.condition)))
 
-    def unobserved(feature: Feature) -> bool:
+    def unobserved(feature: Feature | Among) -> bool:
+        if isinstance(feature, Among):
+            return False
         return feature.property in MOTION and feature.property not in signature[feature.object]
 
     return tuple(_with_doubts(group, unobserved) for group in group_constraints(found))
 
 
-def _with_doubts(group: Group, unobserved: Callable[[Feature], bool]) -> Group:
+def _with_doubts(group: Group, unobserved: Callable[[Feature | Among], bool]) -> Group:
     """A group whose constraints read only what is observed; see `Group.certain`."""
     doubtful = [item for item in group.constraints if any(map(unobserved, _read(item)))]
     if not doubtful:
@@ -151,6 +156,8 @@ def unobserved_motion(scenario: Scenario, seen: Mapping[int, Container[str]], co
         for index, name in read
         if name in MOTION and index in seen and name not in seen[index]
     ]
+    if not names and asks_others(constraint.expression):
+        return "of other label objects not all that counts is observed"
     return f"{' and '.join(names)} {'is' if len(names) == 1 else 'are'} not observed" if names else ""
 
 

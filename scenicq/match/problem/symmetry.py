@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 from scenicq.forest.groups import PARAMS, Comparison, Group
 from scenicq.forest.nodes import (
+    Among,
     Arithmetic,
     Compare,
     Constant,
@@ -66,6 +67,9 @@ def shape_of(group: Group, ego: int, tolerance: Tolerance) -> GroupShape:
                 own = node.op
             case Coordinate():
                 own = node.axis
+            case Among():
+                # the body stands for itself: others that look alike are asked anew
+                own = (id(node.body), node.op, node.category, node.number, node.excluded)
             case _ if is_leaf(node):
                 number = leaves.setdefault(node.identity, len(leaves))  # type: ignore[union-attr]
                 own = (number, node.weights if isinstance(node, Index) else ())

@@ -74,6 +74,7 @@ def find_assignments(
     fixed: Mapping[int, int] | None = None,
     twins: Mapping[int, int] | None = None,
     links: Mapping[int, Collection[int]] | None = None,
+    ranks: Mapping[int, int] | None = None,
     budget: int = 1_000_000,
     spent: Exhausted | None = None,
     reporter: Reporter | None = None,
@@ -88,7 +89,8 @@ def find_assignments(
         fixed: Slots assigned beforehand.
         twins: For a slot, an earlier one that is interchangeable with it: it then takes later candidates only.
         links: For a slot, those that it shares conditions with: they are assigned soon after it.
-        budget: Candidates to try at most.
+        ranks: In which order candidates stand, where that is not the order of their numbers.
+        budget: Candidates to try at most; in order so many from one assignment to the next.
         spent: What is raised then; without it, that there are more steps.
         reporter: Watches.
         in_order: Whether slots are assigned in the order of their names, not the most constrained first.
@@ -99,7 +101,7 @@ def find_assignments(
     watch, most = reporter or SilentReporter(), budget
     assignment = dict(fixed or {})
     used = {candidate: slot for slot, candidate in assignment.items()}
-    twin_of = twins or {}
+    twin_of, rank = twins or {}, ranks or {}
     order = sorted(slots, key=lambda slot: slot.name) if in_order else _order(slots, twin_of, links or {})
     matching = BipartiteMatching([Slot(s.name, tuple(c for c in s.candidates if c not in used)) for s in order])
     if not matching.complete():
@@ -127,12 +129,12 @@ def find_assignments(
                 frame.blamed |= {used[candidate]} & names
                 continue
             twin = twin_of.get(slot)
-            if twin is not None and twin in assignment and candidate <= assignment[twin]:
+            if twin is not None and twin in assignment and not _is_later(candidate, assignment[twin], rank):
                 frame.blamed.add(twin)
                 continue
             if slot in waiting:
                 # those that are interchangeable with it take later ones, of which there must be enough
-                later = [each for each in frame.slot.candidates if each > candidate]
+                later = [each for each in frame.slot.candidates if _is_later(each, candidate, rank)]
                 if len(later) - sum(each in used for each in later) < waiting[slot]:
                     frame.blamed |= {used[each] for each in later if each in used} & names
                     continue
@@ -162,6 +164,7 @@ def find_assignments(
             _jump(frames, frame, assignment, drop, watch)
         elif len(frames) == len(order):
             yield dict(assignment)
+            budget = most if in_order else budget
             # below a solution nothing may be skipped: each slot goes back to the one before it
             for earlier, later in itertools.pairwise(frames):
                 later.blamed.add(earlier.slot.name)
@@ -184,11 +187,17 @@ def _jump(
         watch.jumped(failed.slot.name, back.slot.name)
 
 
+def _is_later(one: int, other: int, ranks: Mapping[int, int]) -> bool:
+    """Whether a candidate stands behind another one."""
+    return ranks.get(one, one) > ranks.get(other, other)
+
+
 def _followers(order: Sequence[Slot], twins: Mapping[int, int]) -> Mapping[int, int]:
-    """For slots that others are interchangeable with, how many take later candidates than they do."""
+    """For slots that others are interchangeable with, how many of the same candidates are taken after theirs."""
     found: dict[int, int] = {}
+    candidates = {slot.name: slot.candidates for slot in order}
     for slot in reversed(order):
-        if slot.name in twins:
+        if slot.name in twins and candidates.get(twins[slot.name]) == slot.candidates:
             found[twins[slot.name]] = found.get(slot.name, 0) + 1
     return found
 

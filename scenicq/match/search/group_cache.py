@@ -8,18 +8,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from scenicq.budget import Exhausted, Trials, look
+from scenicq.forest.among import asks_others
 from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.groups import PARAMS, Group
-from scenicq.forest.nodes import Value
+from scenicq.forest.nodes import Among, Feature, Value
+from scenicq.forest.unobserved import certain_and_possible
 from scenicq.limits import LIMITS
 from scenicq.match.decide.decomposition import chooses_apart, search_decomposed
 from scenicq.match.decide.solver_step import AskSolver
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import LabelProblem
 from scenicq.match.problem.conditioned import Item, LabelNodes, uses_field
+from scenicq.match.problem.label_elements import who_plays
 from scenicq.match.problem.likely_values import likely_group
 from scenicq.match.problem.map_lookups import MapLookups
 from scenicq.match.problem.outcome import (
@@ -39,7 +43,10 @@ from scenicq.match.search.group_plan import GroupPlan
 if TYPE_CHECKING:  # takes long to load
     from scenicq.match.fields.heading_propagation import DirectedCases, KnownCases
 
-__all__ = ["GroupCache", "known_of", "surely", "translated"]
+__all__ = ["POSTPONED", "GroupCache", "known_of", "surely", "translated"]
+
+POSTPONED = "postponed"
+"""The reason of what is undecided for want of patience alone."""
 
 
 @dataclass(eq=False, slots=True)
@@ -61,6 +68,7 @@ class GroupCache:
     lookups: MapLookups
     trials: Trials = field(default_factory=lambda: Trials(LIMITS.witness_trials))
     patience: Patience = Patience.ALL
+    _last: tuple[tuple[Group, tuple[int, ...]], list[Item]] | None = None
     _nodes: LabelNodes = field(default_factory=LabelNodes)
     _cases: KnownCases = field(default_factory=dict["tuple[object, ...]", "DirectedCases"])
     _known: dict[tuple[int, tuple[int, ...]], tuple[Group, Search]] = field(
@@ -71,20 +79,46 @@ class GroupCache:
         """Whether a question takes more patience."""
         return not all(search.is_finished for _, search in self._known.values())
 
-    def items(self, group: Group, assignment: Mapping[int, int]) -> list[Item]:
+    def items(self, group: Group, assignment: Mapping[int, int], *, surely: bool = False) -> list[Item]:
         """The constraints of a group given the label (algorithm 1, line 11).
+
+        Args:
+            group: The group.
+            assignment: Who plays whom.
+            surely: What is not known of label objects without a role is taken for what breaks a constraint; else for
+                what fulfils it.
 
         Raises:
             CannotEvaluate: Geometry cannot tell the value of an expression.
         """
+        items = self._conditioned(group, assignment)
+        if _asks_others(group):
+            items = [(item, certain_and_possible(node, _is_among)[not surely], seen) for item, node, seen in items]
+        return items if self.problem.disc is None else within_radius(items, *self.problem.disc)
+
+    def has_doubts(self, group: Group, assignment: Mapping[int, int]) -> bool:
+        """Whether a group asks of label objects without a role what is not known."""
+        return _asks_others(group) and asks_others(*(node for _, node, _ in self._conditioned(group, assignment)))
+
+    def _conditioned(self, group: Group, assignment: Mapping[int, int]) -> list[Item]:
+        """The constraints with what is observed put in."""
+        asks = _asks_others(group)
+        key = group, tuple([assignment[index] for index in group.objects])
+        if asks and self._last is not None and self._last[0] == key:
+            return self._last[1]
         observed: dict[tuple[int, str], Value] = {
             (index, name): value
             for index in group.objects
             for name, value in self.problem.seen[assignment[index]].items()
         }
         observed.update({(PARAMS, name): value for name, value in self.problem.params.items()})
+        if not asks:
+            return self._nodes.items(group, observed, assignment)
+        observed.update(who_plays(self.problem, assignment))
         items = self._nodes.items(group, observed, assignment)
-        return items if self.problem.disc is None else within_radius(items, *self.problem.disc)
+        # those are asked for twice
+        self._last = key, items
+        return items
 
     def of(self, plan: GroupPlan, assignment: Mapping[int, int]) -> tuple[Group, Outcome]:
         """What is decided for the label objects in a group's roles, said of a group of its shape (see `translated`)."""
@@ -95,13 +129,15 @@ class GroupCache:
         group, search = known
         with self.trials:
             outcome = search.within(self.patience)
-        return group, Undecided(group.constraints[0], "postponed") if outcome is None else outcome
+        return group, Undecided(group.constraints[0], POSTPONED) if outcome is None else outcome
 
     def _steps(self, plan: GroupPlan, assignment: Mapping[int, int]) -> SearchSteps:
-        outcome = self._in_closed_form(plan, assignment) or (yield from self._by_cascade(plan.group, assignment))
-        if plan.group.doubtful and isinstance(outcome, Satisfied):
-            return known_of(plan.group, (yield from self._by_cascade(surely(plan.group), assignment)))
-        return outcome
+        group = plan.group
+        outcome = self._in_closed_form(plan, assignment) or (yield from self._by_cascade(group, assignment))
+        if not isinstance(outcome, Satisfied) or not (group.doubtful or self.has_doubts(group, assignment)):
+            return outcome
+        sure = surely(group) if group.doubtful else group
+        return known_of(group, (yield from self._by_cascade(sure, assignment, surely=True)))
 
     def _in_closed_form(self, plan: GroupPlan, assignment: Mapping[int, int]) -> Outcome | None:
         """What a closed form says, if it is clear."""
@@ -110,18 +146,18 @@ class GroupCache:
         seen = self.problem.seen
         return plan.closed_form.decide(lambda index, name: seen[assignment[index]][name], self.options, self.lookups)
 
-    def _by_cascade(self, group: Group, assignment: Mapping[int, int]) -> SearchSteps:
+    def _by_cascade(self, group: Group, assignment: Mapping[int, int], *, surely: bool = False) -> SearchSteps:
         try:
             look()
             if self.options.method == "smt":
-                return self.ask([self.items(group, assignment)])
+                return self.ask([self.items(group, assignment, surely=surely)])
             likely = likely_group(group)
             if likely is not None:
-                found = yield from self._decided(self.items(likely.group, assignment), self._searched)
+                found = yield from self._decided(self.items(likely.group, assignment, surely=surely), self._searched)
                 if isinstance(found, Satisfied):
                     return likely.restored(found)
                 yield Patience.ALL
-            return (yield from self._decided(self.items(group, assignment), self._at_last))
+            return (yield from self._decided(self.items(group, assignment, surely=surely), self._at_last))
         except CannotEvaluate as error:
             return Undecided(group.constraints[0], f"unsupported: {error}")
         except Exhausted as error:
@@ -180,4 +216,15 @@ def surely(group: Group) -> Group:
 
 def known_of(group: Group, sure: Outcome) -> Outcome:
     """The outcome of a group that may be satisfied, from that of `surely` of it."""
-    return Undecided(group.doubtful[0], UNOBSERVED) if isinstance(sure, Refuted) else sure
+    if not isinstance(sure, Refuted):
+        return sure
+    return Undecided(group.doubtful[0] if group.doubtful else sure.constraint, UNOBSERVED)
+
+
+@lru_cache(maxsize=256)
+def _asks_others(group: Group) -> bool:
+    return asks_others(*(each.expression for each in (*group.constraints, *group.certain)))
+
+
+def _is_among(node: Feature | Among) -> bool:
+    return isinstance(node, Among)

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
 
+from scenicq.forest.among import asks_others
 from scenicq.forest.groups import Group
+from scenicq.forest.nodes import Node
 from scenicq.forest.scenario import Scenario
 from scenicq.match.decide.closed_form import ClosedForm
 from scenicq.match.decide.closed_forms import closed_form_of
@@ -47,7 +49,7 @@ class MatchPlan:
         groups: All of them, in dependency order.
         ego_only: Those about the ego and parameters alone.
         unary: Those about one object and the ego, by that object.
-        joint: Those about several objects.
+        joint: Those about several objects, and those that ask of label objects without a role.
         twins: For an object, an earlier one that is interchangeable with it.
         links: For an object, those that it shares a group with.
         signature: What is observed.
@@ -82,9 +84,10 @@ def make_plan(scenario: Scenario, signature: Signature, options: MatchOptions, k
         for part in subgroups_of(group, scenario.ego):
             small = shape_of(part, scenario.ego, options.tolerance)
             number = kinds.setdefault(small.key, len(kinds))
-            parts.append(GroupPlan(part, number, small.roles, closed_form_of(part, scenario.ego)))
+            small_form = None if asks_others(*_expressions(part)) else closed_form_of(part, scenario.ego)
+            parts.append(GroupPlan(part, number, small.roles, small_form))
         number = kinds.setdefault(shape.key, len(kinds))
-        form = None if group.doubtful else closed_form_of(group, scenario.ego)
+        form = None if group.doubtful or asks_others(*_expressions(group)) else closed_form_of(group, scenario.ego)
         groups.append(GroupPlan(group, number, shape.roles, form, tuple(parts), Relaxation.of(group)))
         paired = [part.roles for part in parts if len(part.roles) > 1]
         # of a chain, the next one is what can be checked next
@@ -93,15 +96,21 @@ def make_plan(scenario: Scenario, signature: Signature, options: MatchOptions, k
             for index in roles:
                 links.setdefault(index, set()).update(roles)
     unary: dict[int, list[GroupPlan]] = {}
+    # what is asked of all label objects comes last, and only of those that are tried
+    late = {each for each in groups if each.roles and asks_others(*_expressions(each.group))}
     for each in groups:
-        if len(each.roles) == 1:
+        if len(each.roles) == 1 and each not in late:
             unary.setdefault(each.roles[0], []).append(each)
     return MatchPlan(
         tuple(groups),
         tuple(each for each in groups if not each.roles),
         {index: tuple(found) for index, found in unary.items()},
-        tuple(each for each in groups if len(each.roles) > 1),
+        tuple(each for each in groups if len(each.roles) > 1 or each in late),
         interchangeable(scenario, built, shapes, options.tolerance),
         {index: frozenset(others - {index}) for index, others in links.items()},
         signature,
     )
+
+
+def _expressions(group: Group) -> list[Node]:
+    return [each.expression for each in group.constraints]

@@ -6,7 +6,9 @@ the search then finds correspondences that satisfy the groups about several obje
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import heapq
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import TypeAlias, cast
 
@@ -21,12 +23,13 @@ from scenicq.match.options import MatchOptions
 from scenicq.match.problem.bipartite_matching import Slot
 from scenicq.match.problem.candidates import LabelProblem
 from scenicq.match.problem.conditioned import Item
+from scenicq.match.problem.constraints import Signature
 from scenicq.match.problem.map_lookups import MapLookups
 from scenicq.match.problem.outcome import Outcome, Patience, Refuted, Satisfied, Search, Undecided
 from scenicq.match.problem.symmetry import in_one_order
 from scenicq.match.search.arc_consistency import arc_consistent
 from scenicq.match.search.backtracking import Consistency, Reporter, find_assignments
-from scenicq.match.search.group_cache import GroupCache, known_of, surely, translated
+from scenicq.match.search.group_cache import POSTPONED, GroupCache, known_of, surely, translated
 from scenicq.match.search.group_plan import GroupPlan, MatchPlan
 
 __all__ = ["Failure", "LabelSearch", "Solution"]
@@ -67,6 +70,7 @@ class Failure:
         return self.outcome.constraint
 
 
+_Found: TypeAlias = Iterator[tuple[MatchPlan, Solution]]
 _Judged: TypeAlias = tuple[list[Slot], set[tuple[int, int]] | None]
 """Objects with their candidates, and which of these are undecided; None in place of the latter where the ego is."""
 
@@ -107,32 +111,68 @@ class LabelSearch:
         self._decisions = GroupCache(self.options, self.problem, self.ask, self.lookups)
 
     def solutions(
-        self, plan: MatchPlan, candidates: Mapping[int, tuple[int, ...]], twins: Mapping[int, int]
-    ) -> Iterator[Solution]:
-        """Every correspondence that matches, interchangeable objects in one order.
+        self, plan_of: Callable[[Signature], MatchPlan], relevant: tuple[frozenset[str], ...], twins: Mapping[int, int]
+    ) -> Iterator[tuple[MatchPlan, Solution]]:
+        """Every correspondence that matches, the nearest first, interchangeable objects in one order.
+
+        Role by role in the order of the program, label objects come in the order of their ranks, whatever is observed
+        of them; only what takes long comes last.
 
         Args:
-            plan: The scenario's groups for what is observed of the candidates.
-            candidates: For each object, the label objects that it may be.
+            plan_of: Gives the scenario's groups for what is observed of candidates.
+            relevant: For each object, the properties for which it matters whether they are observed.
             twins: Objects that are interchangeable in every label: for each, an earlier one.
 
         Raises:
             Exhausted: The search takes more steps than it may.
         """
-        monolithic, was_open = self.options.method == "monolithic", self._open
+        # what has not begun stands where it can begin at the earliest
+        waiting: list[tuple[tuple[int, ...], int, tuple[MatchPlan, Solution] | None, _Found]] = []
+        ended: Exhausted | None = None
+        try:
+            for number, (signature, candidates) in enumerate(self.problem.signatures(relevant)):
+                first = {index: numbers[0] for index, numbers in candidates.items()}
+                found = self._solutions(plan_of, signature, candidates, twins)
+                waiting.append((self._place(first), number, None, found))
+        except Exhausted as error:
+            ended = error
+        heapq.heapify(waiting)
+        while waiting:
+            _, number, solution, found = heapq.heappop(waiting)
+            if solution is not None and self._is_new(solution[1].assignment, twins):
+                yield solution
+            try:
+                following = next(found, None)
+            except Exhausted as error:
+                ended, following = ended or error, None
+            if following is not None:
+                heapq.heappush(waiting, (self._place(following[1].assignment), number, following, found))
+        if ended is not None:
+            raise ended
+
+    def _place(self, assignment: Mapping[int, int]) -> tuple[int, ...]:
+        """Where a correspondence stands among others: label objects by role in the order of the program."""
+        ranks, ego = self.problem.ranks, self.scenario.ego
+        return tuple(ranks[number] for index, number in sorted(assignment.items()) if index != ego)
+
+    def _solutions(
+        self, plan_of: Callable[[Signature], MatchPlan], signature: Signature,
+        candidates: Mapping[int, tuple[int, ...]], twins: Mapping[int, int],
+    ) -> _Found:  # fmt: skip
+        """Those of one signature, some of them perhaps more than once; see `solutions`."""
+        plan = plan_of(signature)
+        monolithic = self.options.method == "monolithic"
         judged: _Judged | None = None
         # what is cheap may settle a label before what takes long is looked at
         for patience in Patience if self.options.method == "auto" else (Patience.ALL,):
-            self._open = was_open
             self._decisions.patience = patience
             judged = None if monolithic else self._slots(plan, candidates)
             found = self._monolithic(plan, candidates) if monolithic else self._modular(plan, judged)
             try:
                 for solution in found:
-                    if self._is_new(solution.assignment, twins):
-                        self._decisions.patience = Patience.ALL
-                        yield solution
-                        self._decisions.patience = patience
+                    self._decisions.patience = Patience.ALL
+                    yield plan, solution
+                    self._decisions.patience = patience
                 if not self._decisions.has_postponed() or next(self._modular_open(plan, judged), None) is None:
                     break
             except Exhausted as error:
@@ -181,7 +221,7 @@ class LabelSearch:
         if isinstance(decided[1], Satisfied):
             return Consistency.YES
         if isinstance(decided[1], Undecided):
-            self._open = True
+            self._open = self._open or decided[1].reason != POSTPONED
             return Consistency.UNKNOWN
         if self.failure is None or depth > self.failure.depth:
             self.failure = Failure(
@@ -198,13 +238,13 @@ class LabelSearch:
     def _modular(self, plan: MatchPlan, judged: _Judged | None) -> Iterator[Solution]:
         if judged is not None and judged[1] is not None:
             ego = {self.scenario.ego: self.problem.ego}
-            for assignment in self._satisfying(plan, _without(judged[0], judged[1]), ego):
+            for assignment in self._in_order(plan, _without(judged[0], judged[1]), ego, accept_unknown=False):
                 yield self._solution(plan, assignment)
 
     def _modular_open(self, plan: MatchPlan, judged: _Judged | None) -> Iterator[Failure]:
         if judged is not None:
             ego = {self.scenario.ego: self.problem.ego}
-            for assignment in self._search(plan, judged[0], ego, accept_unknown=True):
+            for assignment in self._in_order(plan, judged[0], ego, accept_unknown=True):
                 if (failure := self._first_open(plan, assignment)) is not None:
                     yield failure
 
@@ -275,34 +315,52 @@ class LabelSearch:
             answer = one if one is Consistency.UNKNOWN else answer
         return answer
 
-    def _satisfying(self, plan: MatchPlan, slots: list[Slot], ego: Mapping[int, int]) -> Iterator[dict[int, int]]:
-        """Correspondences that satisfy all groups, each once.
+    def _in_order(
+        self, plan: MatchPlan, slots: list[Slot], ego: Mapping[int, int], *, accept_unknown: bool
+    ) -> Iterator[dict[int, int]]:
+        """Correspondences of which no group fails, each once, in the order of objects and of their candidates.
 
-        In two stages: few objects are searched for in the order of the program, so that the first correspondence does
-        not depend on how many candidates are known not to pass. Where that takes more than a few steps, or there are
-        many objects, the most constrained ones come first.
+        In two stages: few objects are searched for in the order of the program. Where that takes more than a few steps,
+        or there are many objects, the most constrained ones come first, again and again among what comes before what
+        was found (`_first`), and then among what comes after it.
         """
-        given: list[dict[int, int]] = []
+        slots = sorted(slots, key=lambda slot: slot.name)
+        options = {slot.name: slot.candidates for slot in slots}
+        twins = {one: other for one, other in plan.twins.items() if options[one] == options[other]}
+
+        def search(space: list[Slot], *, budget: int | None = None, in_order: bool = False) -> Iterator[dict[int, int]]:
+            return self._search(
+                plan, space, ego, twins, accept_unknown=accept_unknown, budget=budget, in_order=in_order
+            )
+
+        spaces = [slots]
         if len(slots) <= LIMITS.ordered_slots:
+            last: dict[int, int] | None = None
             try:
-                for assignment in self._search(plan, slots, ego, accept_unknown=False, budget=LIMITS.ordered_steps):
-                    given.append(assignment)
-                    yield assignment
+                for last in search(slots, budget=LIMITS.ordered_steps, in_order=True):
+                    yield last
                 return
-            except Exhausted:
-                pass
-        for assignment in self._search(plan, slots, ego, accept_unknown=False):
-            if assignment not in given:
-                yield assignment
+            except Exhausted as error:
+                if error.reason != "budget":
+                    raise
+                spaces = spaces if last is None else _behind(slots, last)
+        while spaces:
+            space = spaces.pop()
+            found = _first(space, search)
+            if found is not None:
+                yield found
+                spaces += _behind(space, found)
 
     def _search(
         self,
         plan: MatchPlan,
         slots: list[Slot],
         ego: Mapping[int, int],
+        twins: Mapping[int, int],
         *,
         accept_unknown: bool,
         budget: int | None = None,
+        in_order: bool = False,
     ) -> Iterator[dict[int, int]]:
         """Correspondences of which no group fails.
 
@@ -310,8 +368,10 @@ class LabelSearch:
             plan: The groups.
             slots: The objects with their candidates.
             ego: Who plays the ego.
+            twins: For an object, an earlier one that is interchangeable with it.
             accept_unknown: Whether groups may be undecided.
-            budget: Steps; with a budget, objects are assigned in the order of the program.
+            budget: Steps; what the options say if not given.
+            in_order: Whether objects are assigned in the order of the program.
 
         Raises:
             Exhausted: The budget is used up.
@@ -327,7 +387,6 @@ class LabelSearch:
         for group in plan.joint:
             for index in group.roles:
                 due.setdefault(index, []).append((group, frozenset(group.roles)))
-        options = {slot.name: slot.candidates for slot in slots}
 
         def check(slot: int, assignment: Mapping[int, int]) -> tuple[Consistency, frozenset[int]]:
             for whole, part, roles in parts.get(slot, ()):
@@ -349,11 +408,12 @@ class LabelSearch:
             slots,
             check,
             fixed=ego,
-            twins={one: other for one, other in plan.twins.items() if options[one] == options[other]},
+            twins=twins,
             links=plan.links,
+            ranks=self.problem.ranks,
             budget=self.options.budget if budget is None else min(budget, self.options.budget),
             reporter=self.reporter,
-            in_order=budget is not None,
+            in_order=in_order,
         )
 
     def _solution(self, plan: MatchPlan, assignment: Mapping[int, int]) -> Solution:
@@ -372,7 +432,10 @@ class LabelSearch:
     def _monolithic(self, plan: MatchPlan, candidates: Mapping[int, tuple[int, ...]]) -> Iterator[Solution]:
         ego = {self.scenario.ego: self.problem.ego}
         slots = [Slot(index, options) for index, options in candidates.items() if index != self.scenario.ego]
-        for assignment in find_assignments(slots, _accept, fixed=ego, budget=self.options.budget):
+        ranks = self.problem.ranks
+        for assignment in find_assignments(
+            slots, _accept, fixed=ego, ranks=ranks, budget=self.options.budget, in_order=True
+        ):
             outcome = self._together(plan, assignment)
             if isinstance(outcome, Satisfied):
                 yield Solution(assignment, tuple((group, outcome) for group in plan.groups))
@@ -393,10 +456,12 @@ class LabelSearch:
             return Satisfied({})
         try:
             outcome = self.ask([self.items(each.group, assignment) for each in plan.groups])
-            doubtful = [each.group for each in plan.groups if each.group.doubtful]
+            groups = [each.group for each in plan.groups]
+            doubtful = [group for group in groups if group.doubtful or self._decisions.has_doubts(group, assignment)]
             if doubtful and isinstance(outcome, Satisfied):
-                sure = [surely(each.group) if each.group.doubtful else each.group for each in plan.groups]
-                outcome = known_of(doubtful[0], self.ask([self.items(group, assignment) for group in sure]))
+                sure = [surely(group) if group.doubtful else group for group in groups]
+                items = [self._decisions.items(group, assignment, surely=True) for group in sure]
+                outcome = known_of(doubtful[0], self.ask(items))
             return outcome
         except CannotEvaluate as error:
             return Undecided(plan.groups[0].group.constraints[0], f"unsupported: {error}")
@@ -410,6 +475,42 @@ def _all_of(group: Group) -> tuple[Constraint, ...]:
 def _without(slots: list[Slot], undecided: set[tuple[int, int]]) -> list[Slot]:
     """The slots without undecided candidates."""
     return [Slot(s.name, tuple(c for c in s.candidates if (s.name, c) not in undecided)) for s in slots]
+
+
+def _first(slots: list[Slot], search: Callable[..., Iterator[dict[int, int]]]) -> dict[int, int] | None:
+    """The first assignment in order; where that takes long, one of them.
+
+    Args:
+        slots: In order.
+        search: Finds assignments of some slots, within a budget.
+    """
+    found = next(search(slots), None)
+    if found is None:
+        return None
+    with suppress(Exhausted):
+        for place, slot in enumerate(slots):
+            while earlier := slot.candidates[: slot.candidates.index(found[slot.name])]:
+                space = [*_pinned(slots[:place], found), Slot(slot.name, earlier), *slots[place + 1 :]]
+                nearer = next(search(space, budget=LIMITS.nearer_steps), None)
+                if nearer is None:
+                    break
+                found = nearer
+    return found
+
+
+def _behind(slots: list[Slot], found: Mapping[int, int]) -> list[list[Slot]]:
+    """The slots in which there is what comes after an assignment in order, what comes next at the end."""
+    spaces: list[list[Slot]] = []
+    for place, slot in enumerate(slots):
+        later = slot.candidates[slot.candidates.index(found[slot.name]) + 1 :]
+        if later:
+            spaces.append([*_pinned(slots[:place], found), Slot(slot.name, later), *slots[place + 1 :]])
+    return spaces
+
+
+def _pinned(slots: list[Slot], found: Mapping[int, int]) -> list[Slot]:
+    """Slots with the candidates alone that they have in an assignment."""
+    return [Slot(slot.name, (found[slot.name],)) for slot in slots]
 
 
 def _accept(slot: int, assignment: Mapping[int, int]) -> tuple[Consistency, frozenset[int]]:

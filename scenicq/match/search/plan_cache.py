@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 from scenicq.forest.scenario import Scenario
 from scenicq.match.options import MatchOptions
-from scenicq.match.problem.candidates import Candidates, candidates_of
+from scenicq.match.problem.candidates import Candidates, candidates_of, nearest_first
 from scenicq.match.problem.constraints import Signature, build_groups, relevant_properties
 from scenicq.match.problem.symmetry import interchangeable, shape_of
 from scenicq.match.search.first_fit import FirstFit, LabelRow, first_fit_of, signature_of
@@ -97,7 +97,7 @@ class PlanCache:
                 signature = signature_of(label, self.scenario.ego, roles, self.relevant)
                 fit = None if signature is None else self._first_fit(self.plan(signature))
                 if fit is not None:
-                    found.setdefault(fit, []).append(LabelRow(number, label, roles, {}))
+                    found.setdefault(fit, []).append(LabelRow(number, label, nearest_first(label, 0, roles), {}))
         return found
 
     def _first_fit(self, plan: MatchPlan) -> FirstFit | None:

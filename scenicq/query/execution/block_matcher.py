@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.budget import deadline
+from scenicq.forest.among import asked_of_others
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.unobserved import MOTION
 from scenicq.geometry.network import Network
@@ -50,6 +51,7 @@ class CompiledMap:
         plan: The prefilter.
         motion: Whether the scenario reads observed motion.
         observed: The properties of label objects that matter; None for all.
+        whole: Whether all label objects matter, not only those that may play a role.
     """
 
     scenario: Scenario
@@ -57,6 +59,7 @@ class CompiledMap:
     plan: Plan
     motion: bool = True
     observed: frozenset[str] | None = None
+    whole: bool = False
 
     @classmethod
     def of(
@@ -70,8 +73,9 @@ class CompiledMap:
         plan = Plan(network.name, (), "", (), None)
         if prefilter:
             plan = make_plan(scenario, network, options, deciding=not proofs, counting=reasons)
-        observed = frozenset[str]().union(*relevant_properties(scenario, options))
-        return cls(scenario, network, plan, not MOTION.isdisjoint(observed), observed)
+        asked = asked_of_others(scenario)
+        observed = frozenset[str](asked or ()).union(*relevant_properties(scenario, options))
+        return cls(scenario, network, plan, not MOTION.isdisjoint(observed), observed, asked is not None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,7 +198,9 @@ class Decider:
     def _left(self, compiled: CompiledMap, among: NDArray[np.int64] | None = None) -> Iterator[Candidate]:
         """The labels that the prefilter has left, with as much of each as the matcher looks at."""
         motion, observed = compiled.motion, compiled.observed
-        return candidates(self.connection, compiled.plan, motion=motion, observed=observed, among=among)
+        return candidates(
+            self.connection, compiled.plan, motion=motion, observed=observed, among=among, whole=compiled.whole
+        )
 
     def _recordings(self, compiled: CompiledMap, block: Block) -> Decided:
         """Decide a block of whole recordings over time."""
@@ -218,14 +224,14 @@ class Decider:
 
             def read(wanted: NDArray[np.int64]) -> Iterator[Candidate]:
                 keep_players(self.dataset, connection, plan, block, players)
-                return candidates(connection, plan, motion=compiled.motion, among=wanted)
+                return candidates(connection, plan, motion=compiled.motion, among=wanted, whole=compiled.whole)
         else:
             missed = run_prefilter(self.dataset, connection, plan, block)
             if plan.roles and (missed < 0).any():
                 rows = candidate_rows(connection, plan)
 
             def read(wanted: NDArray[np.int64]) -> Iterator[Candidate]:
-                return candidates(connection, plan, motion=compiled.motion, among=wanted)
+                return candidates(connection, plan, motion=compiled.motion, among=wanted, whole=compiled.whole)
 
         left = Survivors(every[missed < 0], rows, plan.roles or (), read)
         return Decided(missed, [], [], recordings.decide(block, left))

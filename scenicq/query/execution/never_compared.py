@@ -1,7 +1,8 @@
 """What a program sets and the labels of a dataset do not observe: it is not compared, and its author must know.
 
 One pass over the columns in question says for each property that the program sets in how many frames it is missing;
-what no label has is named with its line, what labels have instead, and a name spelled nearly like it.
+what no label has is named with its line, what labels have instead, and a name spelled nearly like it. So is a class of
+which no label object is.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from scenicq.forest.scenario import Scenario
 from scenicq.forest.unobserved import MOTION
 from scenicq.forest.walk import features
 from scenicq.match.options import MatchOptions
-from scenicq.store.classes import ROOT, class_matches, subclasses
+from scenicq.store.classes import ROOT, ancestors, class_matches, fold, is_class, subclasses
 from scenicq.store.dataset import Dataset
 from scenicq.store.place import open_parquet
 from scenicq.store.sql import sql_text
@@ -47,7 +48,8 @@ class Coverage:
     """How much of what a program sets is compared with a dataset.
 
     Attributes:
-        warnings: One for each property that no label has (never-compared); no-tracks, where nothing has a track.
+        warnings: One for each property that no label has (never-compared), and for each class that no label object has
+            (class-absent); no-tracks, where nothing has a track.
         missing: Frames in which a property is missing that others have, by its name in the program.
     """
 
@@ -136,7 +138,7 @@ def coverage(dataset: Dataset, scenarios: Iterable[Scenario], options: MatchOpti
         for each in _settings(scenario, options):
             places.setdefault((each.span, each.name, each.category), each)
     found = sorted(places.values(), key=lambda each: each.span.start if each.span is not None else 0)
-    without = _without_tracks(dataset, scenarios)
+    without = (*_without_objects(dataset, scenarios, options), *_without_tracks(dataset, scenarios))
     if not dataset.manifest.total.frames:
         return Coverage(without)
     with dataset.blamed():
@@ -155,6 +157,30 @@ def coverage(dataset: Dataset, scenarios: Iterable[Scenario], options: MatchOpti
             elif present and lacking:
                 missing[each.what] = max(lacking, missing.get(each.what, 0))
     return Coverage((*without, *warnings), missing)
+
+
+def _without_objects(dataset: Dataset, scenarios: Iterable[Scenario], options: MatchOptions) -> Iterator[Diagnostic]:
+    """A warning for each class of a role that no label object has, with those above it that some have."""
+    counts = dataset.manifest.by_class
+    if not counts:
+        return
+    absent: dict[str, Span | None] = {}
+    for ego, owner in ((scenario.ego, owner) for scenario in scenarios for owner in scenario.objects):
+        played = owner.index != ego or options.ego != "label"
+        there = any(class_matches(owner.category, name, options.classes) for name in counts)
+        if played and is_class(owner.category) and not there:
+            absent.setdefault(owner.category, owner.span)
+    for category, span in absent.items():
+        above = [name for name in ancestors(category)[1:] if name in counts]
+        hints = [
+            f"{counts[name]:,} are of class `{name}`, and may be such: `new {name}` matches them" for name in above
+        ]
+        if any(class_matches(category, name, "coarse") for name in counts):
+            hints.append(f"`--classes coarse` takes all of a kind for a `{fold(category, 'coarse')}`")
+        yield Diagnostic(
+            "class-absent", f"no label object of the dataset is a `{category}`", span, "nothing can play this role",
+            hints=tuple(hints), severity="warning",
+        )  # fmt: skip
 
 
 def _without_tracks(dataset: Dataset, scenarios: Iterable[Scenario]) -> tuple[Diagnostic, ...]:

@@ -12,10 +12,19 @@ from numpy.typing import NDArray
 
 from scenicq.budget import look
 from scenicq.errors import Span
+from scenicq.forest.among import asked_of_others
 from scenicq.match.matcher import Matcher
 from scenicq.match.problem.constraints import relevant_properties
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown, Verdict, WitnessValue
-from scenicq.query.execution.recording_starts import DecidedStart, few_findings, label_of, start_table, starts_of
+from scenicq.query.execution.recording_starts import (
+    DecidedStart,
+    NearestRoles,
+    few_findings,
+    label_of,
+    nearest_roles,
+    start_table,
+    starts_of,
+)
 from scenicq.query.execution.results import IntervalSpan, Result
 from scenicq.query.prefilter.executor import Block
 from scenicq.query.prefilter.survivors import Candidate, CandidateRows
@@ -145,6 +154,7 @@ class RecordingMatcher:
 
     def __post_init__(self) -> None:
         """Choose what is decided before labels are matched."""
+        self._whole = asked_of_others(self.matcher.scenario) is not None
         self._necessary = None if self.reasons else NecessaryConditions(self.matcher.scenario)
         outcomes = self.intervals.outcomes
         if len(outcomes) == 1:
@@ -166,7 +176,7 @@ class RecordingMatcher:
         found = DecidedRecordings(counts=Counter(recordings=len(rows.runs)))
         if not len(left.labels):
             return found
-        players = None if left.rows is None else left.rows.rows
+        players = None if left.rows is None or self._whole else left.rows.rows
         look()
         with TrackBlock(self.dataset, rows.part, rows.runs, players, self.intervals.reach) as block:
             look()
@@ -199,7 +209,7 @@ class RecordingMatcher:
             results = [
                 (int(block.recording_of[at]), _undecided(block, at, verdict)) for at, verdict in undecided.items()
             ]
-            results += self._results(block, intervals, starts, remember)
+            results += self._results(rows, block, intervals, starts)
             found.results += [result for _, result in sorted(results, key=lambda each: each[0])]
         return found
 
@@ -285,27 +295,39 @@ class RecordingMatcher:
         sure: NDArray[np.bool_], read: Iterator[Candidate],
     ) -> Iterator[tuple[int, Candidate, list[int], Mapping[int, tuple[int, ...]] | None, bool]]:  # fmt: skip
         """Labels for the matcher, with their members, who may play whom, and whether plain requirements hold."""
-        members = _objects_of(block, labels) if candidates is None else candidates.members
+        members = _objects_of(block, labels) if candidates is None or self._whole else candidates.members
+        plays: dict[int, NDArray[np.bool_]] = {}
+        if candidates is not None:
+            for index, may in candidates.may.items():
+                every = np.zeros(block.object_count, np.bool_)
+                every[candidates.members] = may
+                plays[index] = every[members]
         ends = np.searchsorted(block.label_of[members], np.append(labels, len(block))).tolist()
         for place, (at, candidate) in enumerate(zip(labels.tolist(), read, strict=True)):
             mine = slice(ends[place], ends[place + 1])
             among: Mapping[int, tuple[int, ...]] | None = candidate.among
             if candidates is not None:
-                among = {
-                    index: tuple((np.flatnonzero(may[mine]) + 1).tolist()) for index, may in candidates.may.items()
-                }
+                among = {index: tuple((np.flatnonzero(may[mine]) + 1).tolist()) for index, may in plays.items()}
             own = [int(block.ego(np.array([at]))[0]), *members[mine].tolist()]
             yield at, candidate, own, among, bool(sure[place])
 
     # --- results
 
     def _results(
-        self, block: TrackBlock, intervals: Sequence[IntervalVerdict], starts: _Starts,
-        remember: Callable[[int], Remembered],
-    ) -> Iterator[tuple[int, Result]]:  # fmt: skip
-        """Intervals as results, with the recordings that they are of."""
-        witnesses = self._witnesses(intervals if self.proofs else (), starts, remember)
-        scenario = self.matcher.scenario
+        self, rows: Block, block: TrackBlock, intervals: Sequence[IntervalVerdict], starts: _Starts
+    ) -> Iterator[tuple[int, Result]]:
+        """Intervals as results, with the recordings that they are of: by time, then the nearest first."""
+        scenario, table = self.matcher.scenario, starts.table
+        origins = np.array([each.origin for each in intervals], dtype=np.int64)
+        told = nearest_roles(scenario, table, self.matcher.plans.always_twins, origins)
+        order = sorted(
+            range(len(told)),
+            key=lambda n: (intervals[n].recording, intervals[n].start, intervals[n].end, told[n].place),
+        )
+        intervals, told = [intervals[n] for n in order], [told[n] for n in order]
+        witnesses: Mapping[int, Mapping[str, WitnessValue]] = {}
+        if self.proofs:
+            witnesses = self._witnesses(rows, intervals, told, starts)
         open_ended = scenario.dynamics is None or not scenario.dynamics.terminates
         recordings = np.array([each.recording for each in intervals], dtype=np.int64)
         firsts = np.array([first for first, _ in block.runs], dtype=np.int64)[recordings]
@@ -314,9 +336,10 @@ class RecordingMatcher:
         names = {each: block.name(each) for each in cast("list[int]", np.unique(recordings).tolist())}
         objects = [owner.name for owner in scenario.objects]
         start_us, end_us = (cast("list[int]", block.times_us[labels].tolist()) for labels in (first, last))
-        rows = zip(intervals, block.frames(first), block.frames(last), start_us, end_us, strict=True)
-        for each, frame, last_frame, begins_us, ends_us in rows:
-            roles = {objects[index]: _named(track) for index, track in each.binding}
+        pairs = zip(intervals, told, strict=True)
+        found = zip(pairs, block.frames(first), block.frames(last), start_us, end_us, strict=True)
+        for (each, who), frame, last_frame, begins_us, ends_us in found:
+            roles = {objects[index]: _named(track) for index, track in sorted(who.tracks.items())}
             verdict: Verdict
             if each.truth == TRUE:
                 verdict = Match(roles, {**witnesses.get(each.origin, {}), **each.witness})
@@ -330,23 +353,40 @@ class RecordingMatcher:
             yield each.recording, Result(frame, names[each.recording], begins_us, verdict, interval=span)
 
     def _witnesses(
-        self, intervals: Sequence[IntervalVerdict], starts: _Starts, remember: Callable[[int], Remembered]
-    ) -> Mapping[int, Mapping[str, WitnessValue]]:  # fmt: skip
+        self, rows: Block, intervals: Sequence[IntervalVerdict], told: Sequence[NearestRoles], starts: _Starts
+    ) -> Mapping[int, Mapping[str, WitnessValue]]:
         """The witnesses of the initial scenes of intervals that match, by the numbers of their starts."""
-        wanted = sorted({each.origin for each in intervals if each.truth == TRUE})
-        decided = starts.decided
-        verdicts: dict[int, Verdict] = {each: decided[each].verdict for each in wanted if each in decided}
+        wanted = {each.origin: who for each, who in zip(intervals, told, strict=True) if each.truth == TRUE}
+        verdicts: dict[int, Verdict] = {}
         rest: dict[int, list[int]] = {}
-        for each in wanted:
-            if each not in decided:
+        for each, who in sorted(wanted.items()):
+            known = starts.decided.get(each)
+            if known is not None:
+                same = known.found == who.members
+                verdicts[each] = known.verdict if same else self._again(starts, each, who, known)
+            else:
                 rest.setdefault(int(starts.table.outcomes[each]), []).append(each)
         scenario = self.matcher.scenario
         others = [owner.index for owner in scenario.objects if owner.index != scenario.ego]
         among = {index: (number,) for number, index in enumerate(others, 1)}
         for outcome, numbers in rest.items():
-            labels = [(remember(each)[0], among) for each in numbers]
+            found = [
+                label_of(scenario, starts.table.block, wanted[each].members, rows.map, self._relevant)
+                for each in numbers
+            ]
+            labels = [(label, among) for label, _ in found]
             verdicts.update(zip(numbers, self._search_of(outcome).rest.match_all(labels), strict=True))
         return {number: each.witness for number, each in verdicts.items() if isinstance(each, Match)}
+
+    def _again(self, starts: _Starts, number: int, who: NearestRoles, known: DecidedStart) -> Verdict:
+        """The verdict of a start that the matcher has decided, with interchangeable objects in another order."""
+        scenario, block = self.matcher.scenario, starts.table.block
+        given = {
+            scenario.objects[index].name: block.id(member)
+            for index, member in who.members.items()
+            if not block.is_ego(member)
+        }
+        return self._search_of(int(starts.table.outcomes[number])).matcher.match(known.label, given=given)
 
 
 def _objects_of(block: TrackBlock, labels: NDArray[np.int64]) -> NDArray[np.int64]:

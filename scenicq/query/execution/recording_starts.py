@@ -19,9 +19,10 @@ from scenicq.match.problem.symmetry import classes_of_twins
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown
 from scenicq.store.labels import Label, LabelObject, Motion
 from scenicq.store.track_block import TrackBlock
+from scenicq.store.tracks import TrackKey
 from scenicq.temporal.stretches import StartTable
 
-__all__ = ["DecidedStart", "few_findings", "label_of", "start_table", "starts_of"]
+__all__ = ["DecidedStart", "NearestRoles", "few_findings", "label_of", "nearest_roles", "start_table", "starts_of"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,13 +30,16 @@ class DecidedStart:
     """A start that the matcher has decided.
 
     Attributes:
-        members: Who plays each object of the scenario, by index, as a member of the block.
+        members: Who plays each object of the scenario, by index, as a member of the block; interchangeable ones in the
+            order of their tracks.
+        found: The same as the matcher has found it, which the verdict is about.
         verdict: A match, or unknown.
         label: The label.
         correspondence: The label object of each object, by name.
     """
 
     members: Mapping[int, int]
+    found: Mapping[int, int]
     verdict: Match | Unknown
     label: Label
     correspondence: Mapping[str, str]
@@ -87,11 +91,65 @@ def starts_of(
                 yield verdict
             continue
         numbers = {**finding.assignment, scenario.ego: finding.search.problem.ego}
-        chosen = {index: members[number] for index, number in numbers.items()}
+        own = {index: members[number] for index, number in numbers.items()}
+        chosen = dict(own)
         for twins in classes_of_twins(finding.plan.twins):
             ordered = sorted([chosen[index] for index in twins], key=block.key)
             chosen.update(zip(sorted(twins), ordered, strict=True))
-        yield DecidedStart(chosen, verdict, label, verdict.correspondence)
+        yield DecidedStart(chosen, own, verdict, label, verdict.correspondence)
+
+
+@dataclass(frozen=True, slots=True)
+class NearestRoles:
+    """Who plays whom in a start as it is told: interchangeable objects come nearest first.
+
+    Attributes:
+        members: Who plays each object, by index, as a member of the block.
+        tracks: Their tracks.
+        place: Where the start stands among others: role by role by the distance from the ego, then by name.
+    """
+
+    members: Mapping[int, int]
+    tracks: Mapping[int, TrackKey]
+    place: tuple[tuple[float, TrackKey], ...]
+
+
+def nearest_roles(
+    scenario: Scenario, table: StartTable, twins: Mapping[int, int], wanted: NDArray[np.int64]
+) -> list[NearestRoles]:
+    """How some starts are told.
+
+    Args:
+        scenario: The scenario.
+        table: The starts.
+        twins: For an object, an earlier one that is interchangeable with it over time.
+        wanted: The numbers of the starts.
+    """
+    block, ego = table.block, table.members[scenario.ego][wanted]
+    x, y = block.numbers("x"), block.numbers("y")
+    indices = sorted(table.members)
+    chosen = [table.members[index][wanted] for index in indices]
+    far = [(x[mine] - x[ego]) ** 2 + (y[mine] - y[ego]) ** 2 for mine in chosen]
+    keys = [block.keys(mine) for mine in chosen]
+    classes = [sorted(each) for each in classes_of_twins(twins)]
+    found: list[NearestRoles] = []
+    for members, away, tracks in zip(
+        zip(*(mine.tolist() for mine in chosen), strict=True),
+        zip(*(each.tolist() for each in far), strict=True),
+        zip(*keys, strict=True),
+        strict=True,
+    ):
+        roles = dict(zip(indices, zip(away, tracks, members, strict=True), strict=True))
+        for alike in classes:
+            roles.update(zip(alike, sorted(roles[index] for index in alike), strict=True))
+        found.append(
+            NearestRoles(
+                {index: member for index, (_, _, member) in roles.items()},
+                {index: track for index, (_, track, _) in roles.items()},
+                tuple((away, track) for index, (away, track, _) in roles.items() if index != scenario.ego),
+            )
+        )
+    return found
 
 
 def start_table(

@@ -328,7 +328,7 @@ def _outlook(options: MatchOptions, sample: _Sample, change: ProgramChange, solv
         if not count or looked_at >= most or time_is_up():
             continue
         matcher = Matcher(world.scenario, options, solver)
-        labels = islice(candidates(connection, world.plan, motion=world.motion), most - looked_at)
+        labels = islice(candidates(connection, world.plan, motion=world.motion, whole=world.whole), most - looked_at)
         for verdict in matcher.match_all([(each.label, each.among) for each in labels]):
             looked_at += 1
             matched += isinstance(verdict, Match)

@@ -13,7 +13,7 @@ from scenicq.errors import Span
 from scenicq.forest.groups import PARAMS, Comparison, Condition, Group
 from scenicq.forest.nodes import Select
 from scenicq.forest.scenario import Scenario
-from scenicq.forest.walk import postorder
+from scenicq.forest.walk import conjuncts, postorder
 from scenicq.geometry.network import Network
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.constraints import build_groups, compared, relevant_properties
@@ -25,6 +25,8 @@ from scenicq.query.prefilter.map_relations import (
     look_up_of,
     shared_look_ups,
 )
+from scenicq.query.prefilter.other_objects import proof
+from scenicq.store.classes import Granularity
 from scenicq.store.sql import sql_text
 
 __all__ = ["necessary_conditions", "sufficient_conditions"]
@@ -91,7 +93,7 @@ def sufficient_conditions(
     found = list(_without_attributes(scenario, options, relevant))
     signature = (*(names & _COLUMNED for names in relevant), frozenset[str]())
     for group in build_groups(scenario, signature, options):
-        found += _proof(group, reader, scenario.ego)
+        found += _proof(group, reader, scenario.ego, options.classes)
     if any(each.sql is False for each in found):
         return None
     return tuple(each for each in found if each.region or each.sql is not True)
@@ -113,7 +115,7 @@ def _without_attributes(
         yield ColumnCondition((), _lacks(f"{EGO}.params", params))
 
 
-def _proof(group: Group, reader: ConditionReader, ego: int) -> Iterator[ColumnCondition]:
+def _proof(group: Group, reader: ConditionReader, ego: int, classes: Granularity) -> Iterator[ColumnCondition]:
     """What proves that all constraints of a group can be satisfied together."""
     comparisons = [each for each in group.constraints if isinstance(each, Comparison)]
     if len(comparisons) > 1 or any(each.object == PARAMS for each in comparisons):
@@ -122,7 +124,12 @@ def _proof(group: Group, reader: ConditionReader, ego: int) -> Iterator[ColumnCo
     meant = _meant_elements(group, ego)
     for constraint in group.constraints:
         if isinstance(constraint, Condition):
-            yield from reader.requirement(constraint.expression, meant)
+            for part in conjuncts(constraint.expression):
+                sql = proof(part, ego, classes)
+                if sql is None:
+                    yield from reader.requirement(part, meant)
+                else:
+                    yield ColumnCondition((), sql)
         else:
             yield from reader.comparison(constraint, meant)
 

@@ -21,6 +21,7 @@ from scenicq.query.prefilter.condition_reader import EGO, ColumnCondition
 from scenicq.query.prefilter.conditions import necessary_conditions, sufficient_conditions
 from scenicq.query.prefilter.decision import decision, new_table
 from scenicq.query.prefilter.map_relations import MapRelations
+from scenicq.query.prefilter.other_objects import OBJECTS, OTHER, OtherCondition, other_conditions
 from scenicq.query.prefilter.params import param_conditions
 from scenicq.query.prefilter.plan_draft import Draft, Stage, Step, blamed_step
 from scenicq.query.prefilter.regions import RegionNames
@@ -30,7 +31,7 @@ from scenicq.store.sql import sql_text
 
 __all__ = ["LABELS", "MEMBERSHIPS", "OBJECTS", "PASSED", "SENSORS", "Plan", "make_plan"]
 
-LABELS, OBJECTS, MEMBERSHIPS = "block_labels", "block_objects", "block_memberships"
+LABELS, MEMBERSHIPS = "block_labels", "block_memberships"
 """The views that a plan reads: rows of a block of each table with their `number` in the file."""
 SENSORS = "block_sensors"
 """The view of the sensor files of a block."""
@@ -149,7 +150,10 @@ def make_plan(
             roles.append(_Role(owner, classes, plain, placed, columns.setdefault(key, f"c{len(columns)}")))
     pairs = _pairs(found)
     draft, params = Draft(), list(param_conditions(scenario, options))
-    _frames(draft, [each for each in found if not each.objects], params, roles, pairs)
+    others = list(other_conditions(scenario, options.classes)) if own_ego else []
+    _frames(draft, [each for each in found if not each.objects], params, roles, pairs, others)
+    if others:
+        _others(draft, others)
     if roles:
         _objects(draft, roles, pairs, options, counting=counting)
     proofs = sufficient_conditions(scenario, network, options, relations) if deciding else None
@@ -193,9 +197,11 @@ def _frames(
     params: Sequence[ColumnCondition],
     roles: Sequence[_Role],
     pairs: dict[tuple[int, ...], list[ColumnCondition]],
+    others: Sequence[OtherCondition],
 ) -> None:
     """What the columns of the frame decide."""
-    used = [each.sql for role in roles for each in role.plain] + [each.sql for tied in pairs.values() for each in tied]
+    used = [each.counted for each in others]
+    used += [each.sql for role in roles for each in role.plain] + [each.sql for tied in pairs.values() for each in tied]
     kept = "".join(f", {EGO}.{name}" for name in columns_of(EGO, used))
     blamed = [
         (f"NOT coalesce({each.sql}, true)", draft.step(each.what, each.span))
@@ -208,6 +214,23 @@ def _frames(
         f"WHERE {EGO}.number IN (SELECT f FROM {PASSED})"
     )
     draft.stages.append(Stage("stage0", (new_table("stage0", query),)))
+
+
+def _others(draft: Draft, others: Sequence[OtherCondition]) -> None:
+    """How many label objects count, whether or not they may play a role."""
+    tallied = ", ".join(f"count(*) FILTER ({each.counted}) AS n{place}" for place, each in enumerate(others))
+    some = " OR ".join(dict.fromkeys(each.counted for each in others))
+    counts = (
+        f"SELECT {EGO}.f, {tallied} FROM {OBJECTS} {OTHER} JOIN {draft.last} {EGO} ON {OTHER}.frame = {EGO}.frame "
+        f"WHERE {EGO}.missed IS NULL AND ({some}) GROUP BY {EGO}.f"
+    )
+    blamed: list[tuple[str, int]] = []
+    for place, each in enumerate(others):
+        what = "" if each.span is None else " ".join(each.span.text.split())
+        number, few = f"coalesce(t.n{place}, 0)", each.at_least
+        missed = f"{number} > {each.most}" if few is None else f"{number} < {few}"
+        blamed.append((missed, draft.step(what, each.span)))
+    draft.stage([], blamed, f"LEFT JOIN ({counts}) t ON t.f = s.f")
 
 
 def _reached(role: _Role, classes: Sequence[str]) -> str:
@@ -261,9 +284,12 @@ def _objects(
     levels = [f"{_reached(role, classes)} AS {role.column}" for role in distinct.values()]
     near = _near(options) if own_ego else "true"
     some = "true" if counting else _some_role(distinct.values())
+    left = f"{EGO}.missed IS NULL"
+    if draft.last != "stage0":
+        left += f" AND {EGO}.f IN (SELECT f FROM {draft.last} WHERE missed IS NULL)"
     narrow = (
         f"SELECT {EGO}.f, a.number AS row, {', '.join([*kept, *levels])} FROM {OBJECTS} a "
-        f"JOIN stage0 {EGO} ON a.frame = {EGO}.frame WHERE {EGO}.missed IS NULL AND ({' OR '.join(classes)}) "
+        f"JOIN stage0 {EGO} ON a.frame = {EGO}.frame WHERE {left} AND ({' OR '.join(classes)}) "
         f"AND {near} AND {some}"
     )
     pools: dict[str, int] = {}

@@ -19,6 +19,7 @@ from scenicq.forest.interpret import OnMap, RegionNode, interpret, steps_of
 from scenicq.forest.interval_values import Interval, IntervalValue, IntervalVector, Truth
 from scenicq.forest.intervals import IntervalDomain
 from scenicq.forest.nodes import (
+    Among,
     ArithmeticOp,
     CompareOp,
     Constant,
@@ -154,6 +155,9 @@ class _Alternatives:
 
     def feature(self, node: Feature) -> Alternatives:
         return self._few([self.domain.feature(node)])
+
+    def among(self, node: Among, args: Sequence[Alternatives]) -> Alternatives:
+        return self._few([self.domain.among(node, ())], None)
 
     def variable(self, node: Leaf, args: Sequence[Alternatives]) -> Alternatives:
         own = frozenset((node.identity,))

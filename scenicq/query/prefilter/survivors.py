@@ -81,6 +81,7 @@ def candidates(
     motion: bool = False,
     observed: Collection[str] | None = None,
     among: NDArray[np.int64] | None = None,
+    whole: bool = False,
 ) -> Iterator[Candidate]:
     """The labels that are left of the block on which the prefilter was run last, in order.
 
@@ -90,6 +91,7 @@ def candidates(
         motion: Whether what is computed of motion is read, too.
         observed: Of label objects only class, position and these properties are read; None for all that is known.
         among: Rows of `labels`: only these; None for all.
+        whole: Whether labels have all their objects, not only those that may play a role.
     """
     left = f"(SELECT f FROM {plan.stages[-1].table} WHERE missed IS NULL)"
     if among is not None:
@@ -108,12 +110,18 @@ def candidates(
         for label in _assembled(frames, objects, sensors):
             yield Candidate(label, None)
         return
-    if plan.roles:
+    if whole:
+        flags = "".join(f", coalesce(r.r{place}, false) AS r{place}" for place in range(len(plan.roles)))
+        joined = "LEFT JOIN roles r ON a.number = r.row" if plan.roles else ""
+        who = f"{OBJECTS} a JOIN (SELECT frame, number AS f FROM {LABELS}) l ON a.frame = l.frame {joined} "
+        who += f"WHERE l.f IN {left}"
+    elif plan.roles:
         flags = "".join(f", r.r{place}" for place in range(len(plan.roles)))
         who = f"{OBJECTS} a JOIN roles r ON a.number = r.row WHERE r.f IN {left}"
     else:
         flags, who = "", f"(SELECT *, number AS f FROM {OBJECTS} LIMIT 0) a JOIN (SELECT 0 AS f LIMIT 0) r USING (f)"
-    objects = _rows(connection, f"SELECT {of_objects}, r.f{flags} FROM {who} ORDER BY a.number")
+    frame = "l.f" if whole else "r.f"
+    objects = _rows(connection, f"SELECT {of_objects}, {frame}{flags} FROM {who} ORDER BY a.number")
     numbers, owners = frames["number"].to_numpy(), objects["f"].to_numpy()
     counts = np.searchsorted(owners, numbers, side="right") - np.searchsorted(owners, numbers)
     frames = frames.set_column(frames.column_names.index("object_count"), "object_count", [counts.astype(np.int32)])

@@ -145,6 +145,7 @@ def test_what_a_label_observes_is_met():
 
 
 @pytest.mark.parametrize("limit", ["pruned_boxes", "narrowing_passes", "heading_passes", "witness_replays"])
+@pytest.mark.one_in(2)
 def test_a_limit_leaves_it_undecided(limit, monkeypatch):
     monkeypatch.setattr(LIMITS, limit, 0)
     for name, items in NEVER.items():
@@ -180,6 +181,7 @@ def test_z3_contradicts_nothing():
 
 
 @pytest.mark.parametrize("seed", range(60))
+@pytest.mark.one_in(3)
 def test_what_holds_somewhere_is_not_refuted(seed):
     rng = random.Random(seed)
     leaves = [between(*sorted((rng.uniform(-9, 9), rng.uniform(-9, 9)))) for _ in range(3)]

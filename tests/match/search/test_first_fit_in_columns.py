@@ -90,7 +90,7 @@ def with_candidates(scenario, options, found):
 
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("options", OPTIONS, ids=["plain", "box", "disc"])
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(12)
 def test_the_same_is_found_together(name, options):
     scenario = compiled(HEADER + CASES[name], STREET)
     matcher = Matcher(scenario, options)
@@ -178,6 +178,7 @@ def test_columns_are_what_numbers_are(rows):
 
 
 @pytest.mark.parametrize("name", sorted(CASES))
+@pytest.mark.one_in(4)
 def test_whole_numbers_of_a_label_are_numbers(name):
     """Whoever makes labels in Python writes `x=3`, too."""
     scenario = compiled(HEADER + CASES[name], STREET)

@@ -6,6 +6,7 @@ import pytest
 
 from scenicq.errors import ScenarioError, Source
 from scenicq.importers.ingest import ingest
+from scenicq.match.options import MatchOptions
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.dataset import open_dataset
 
@@ -200,3 +201,26 @@ def test_the_report_names_it_with_its_line(dataset, run, tmp_path):
     assert "`Car#2.spede` is never compared" in page
     assert "p.scenic:3:" in page
     assert "the labels have of `Car`: heading, width, length, velocity, speed, colour" in page
+
+
+@pytest.mark.parametrize(("category", "classes", "hints"), [
+    ("Vehicle", "fine", None), ("Car", "fine", None), ("Pedestrian", "fine", None),
+    ("Child", "fine", ["2 are of class `Pedestrian`", "`--classes coarse`"]), ("Bus", "fine", ["`--classes coarse`"]),
+    ("Cone", "fine", []), ("Child", "coarse", None), ("Bus", "coarse", None), ("Cone", "coarse", []),
+])  # fmt: skip
+def test_a_class_that_no_label_object_has_is_told_with_what_may_be_such(dataset, category, classes, hints):
+    query = asked(dataset, f"new {category} {PLACED}", match=MatchOptions(classes=classes))
+    found = query.coverage().warnings
+    assert [each.code for each in found] == ([] if hints is None else ["class-absent"])
+    for each in found:
+        assert len(each.hints) == len(hints)
+        assert all(hint.startswith(start) for hint, start in zip(each.hints, hints, strict=True))
+    if hints is not None:
+        assert not list(query.results())
+
+
+def test_the_ego_of_a_label_is_no_label_object(dataset):
+    query = Query(
+        dataset, Source("p.scenic", f"model scenic.domains.driving.model\nego = new Bus {PLACED}\n"), QueryOptions()
+    )
+    assert query.coverage().warnings == ()

@@ -80,7 +80,7 @@ def two(tmp_path: Path) -> tuple[Path, Path]:
 
 @pytest.mark.parametrize("replacement", REPLACEMENTS)
 @pytest.mark.parametrize("way", [by_blocks, by_shards, pytest.param(by_dask, marks=pytest.mark.slow)])
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(16)
 def test_processes_read_the_dataset_that_was_asked_about_or_none(
     two: tuple[Path, Path],
     way: Callable[[Query], Iterator[Result]],
@@ -99,6 +99,7 @@ def test_processes_read_the_dataset_that_was_asked_about_or_none(
 
 
 @pytest.mark.parametrize("replacement", REPLACEMENTS)
+@pytest.mark.one_in(4)
 def test_one_process_finds_what_it_had_found_or_nothing(
     two: tuple[Path, Path], replacement: Callable[[Path, Path], None]
 ) -> None:

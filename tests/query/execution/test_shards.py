@@ -174,6 +174,7 @@ def test_dask_gives_the_same_and_listens_on_the_loopback_only(dataset: Dataset, 
 
 @needs_signals
 @pytest.mark.usefixtures("needs_dask")
+@pytest.mark.slow
 def test_dask_begins_nothing_when_the_time_is_over_and_leaves_nothing_behind(
     dataset: Dataset, undisturbed: Found, tmp_path: Path
 ) -> None:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 
+import pytest
+
 from scenicq.errors import Source
 from scenicq.limits import LIMITS
 from scenicq.match.options import MatchOptions
@@ -38,6 +40,7 @@ def with_tolerance(text, program, dataset):
     return ask(dataset, program, options)
 
 
+@pytest.mark.slow
 def test_under_the_tolerance_that_is_told_the_recording_matches_and_under_a_smaller_one_it_does_not(crossroads):
     program = "other = new Car ahead of ego by Range(3, 20)\n"
     query = ask(crossroads, program, FOR_SECONDS)
@@ -65,6 +68,7 @@ def test_a_ranking_that_has_not_looked_at_all_recordings_says_so(crossroads, mon
         assert [each.code for each in query.funnel.warnings if each.code == "ranking-cut"] == cut
 
 
+@pytest.mark.slow
 def test_with_the_number_that_is_told_the_recording_matches(crossroads):
     program = "parked = new Car\nrequire (distance to parked) < 30\nrequire always parked.speed < 0.2\n"
     query = ask(crossroads, program)

@@ -27,6 +27,7 @@ def query(crossroads, scenarios):
     return Query(open_dataset(crossroads), read_program(scenarios / "02_crossing_cars.scenic"), SETTING)
 
 
+@pytest.mark.slow
 def test_the_ranking_is_that_of_looking_at_every_frame(query):
     (name,) = query.dataset.maps
     matcher = Matcher(query.compile(name)[0], query.options.match)

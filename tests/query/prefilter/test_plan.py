@@ -94,7 +94,7 @@ def cases():
 
 
 @pytest.mark.parametrize(("name", "options"), list(cases()))
-@pytest.mark.one_in(12)
+@pytest.mark.one_in(96)
 def test_the_prefilter_loses_nothing(dataset, name, options):
     text = PROGRAMS[name]
     with_it, query = found(dataset, text, OPTIONS[options], prefilter=True)
@@ -114,7 +114,7 @@ def tied_cases():
 
 
 @pytest.mark.parametrize(("name", "options"), list(tied_cases()))
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(12)
 def test_nothing_is_lost_between_objects_and_in_unions(tied, name, options):
     text = (TIED | RANDOM)[name]
     with_it, query = found(tied, text, OPTIONS[options], prefilter=True)

@@ -1,0 +1,273 @@
+"""`others`, `count` and `nearest` of the module `scenicq.labels`: label objects that need not play a role.
+
+What is asked of one of them is evaluated once, of an element that stands for each (`forest/among`), and closed where
+`any`, `all` or `len` ends its list.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, cast
+
+from scenicq.compiler import operators
+from scenicq.compiler.coerce import OBSERVABLE, property_node, to_boolean
+from scenicq.compiler.values import Instance, LabelObjects, ModelValue, Nearest, OtherList, ScenicClass, describe, fail
+from scenicq.errors import Span
+from scenicq.forest import build
+from scenicq.forest.kinds import kind_of
+from scenicq.forest.nodes import (
+    ELEMENT,
+    GIVEN,
+    IDENTITY,
+    RANK,
+    TRACK,
+    Among,
+    AmongOp,
+    Body,
+    Compare,
+    CompareOp,
+    Constant,
+    DirectionAt,
+    Feature,
+    Index,
+    LogicOp,
+    Node,
+    Select,
+)
+from scenicq.forest.walk import children, is_leaf, leaves, postorder, rebuild
+
+if TYPE_CHECKING:
+    from scenicq.compiler.interpreter import Interpreter
+
+__all__ = [
+    "count",
+    "gathered",
+    "gathered_truth",
+    "how_many",
+    "is_element",
+    "is_nearest",
+    "nearest",
+    "others",
+    "same_object",
+]
+
+_FIRST_ELEMENT = -1000
+_numbers = itertools.count(_FIRST_ELEMENT, -1)
+
+
+def _element(objects: LabelObjects, span: Span) -> Instance:
+    """What stands for each of some label objects."""
+    made = Instance(objects.cls, next(_numbers), span)
+    made.properties.update(dict.fromkeys(OBSERVABLE))
+    return made
+
+
+def others(run: Interpreter, span: Span, *args: ModelValue, **named: ModelValue) -> ModelValue:
+    """`others(C)`."""
+    cls = _class(run, span, "others", args, named, ())
+    return LabelObjects(cls, tuple(_who(each, TRACK, span) for each in run.objects))
+
+
+def count(run: Interpreter, span: Span, *args: ModelValue, **named: ModelValue) -> ModelValue:
+    """`count(C, within=R)`."""
+    if args and isinstance(args[0], OtherList) and len(args) == 1 and not named:
+        return how_many(args[0], span)
+    cls = _class(run, span, "count", args, named, _FILTERS)
+    every = _all_of(run, cls, span)
+    element = _element(every, span)
+    return _among(AmongOp.COUNT, every, element, _counting(named, span)(element), span)
+
+
+def nearest(run: Interpreter, span: Span, *args: ModelValue, **named: ModelValue) -> ModelValue:
+    """`nearest(C, within=R)`."""
+    cls = _class(run, span, "nearest", args, named, _FILTERS)
+    every, counts, ego = _all_of(run, cls, span), _counting(named, span), run.ego(span)
+    made = Nearest(cls, None, span, objects=every, counts=counts, ego=ego)
+    element = _element(every, span)
+    away = operators.distance_to(element, ego, span)
+    for name in OBSERVABLE:
+        value = cast(Node, property_node(element, name, span))
+        made.properties[name] = _among(
+            AmongOp.NEAREST, every, element, counts(element), span, distance=away, value=value
+        )
+    return made
+
+
+def is_nearest(one: Instance, other: Nearest, span: Span) -> Node:
+    """Whether an object is the nearest: it counts, and nobody else that counts comes before it."""
+    assert other.objects is not None
+    assert other.counts is not None
+    if one.index is None:
+        raise fail("wrong-type", "only an object can be the nearest", span, f"this is {describe(one)}")
+    objects, element = other.objects, _element(other.objects, span)
+    counts, ego = other.counts(element), other.ego
+    same = _compare("==", _who(element, IDENTITY, span), _who(one, IDENTITY, span), span)
+    away, least = operators.distance_to(element, ego, span), operators.distance_to(one, ego, span)
+    ranks = _compare("<", _who(element, RANK, span), _who(one, RANK, span), span)
+    before = build.logic(
+        LogicOp.OR,
+        _compare("<", away, least, span),
+        _both((_compare("==", away, least, span), ranks), span),
+        span=span,
+    )
+    is_there = _among(AmongOp.AT_LEAST, objects, element, _both((same, counts), span), span)
+    someone = _among(AmongOp.AT_LEAST, objects, element, _both((build.opposite(same), counts, before), span), span)
+    # where it is not seen, nothing is known of it, also where nobody is
+    seen = Compare(CompareOp.EQ, _who(one, IDENTITY, span), _who(one, IDENTITY, span), span=span)
+    return Select(seen, (build.constant(False), _both((is_there, build.opposite(someone)), span)), span=span)
+
+
+def gathered(
+    objects: LabelObjects, span: Span, visit: Callable[[Instance], tuple[tuple[Node, ...], ModelValue]]
+) -> OtherList:
+    """A list with something of each of some label objects.
+
+    Args:
+        objects: The label objects.
+        span: Where the list is made.
+        visit: Gives conditions on what stands for each, and what the list has of it.
+    """
+    element = _element(objects, span)
+    return OtherList(objects, element, *visit(element))
+
+
+def is_element(value: ModelValue) -> bool:
+    """Whether a value stands for each of some label objects."""
+    return isinstance(value, Instance) and value.index is not None and value.index <= _FIRST_ELEMENT
+
+
+def same_object(one: Instance, other: Instance, span: Span) -> ModelValue:
+    """Whether what stands for label objects is an object, or what stands for others."""
+    if one is other or one.index is None or other.index is None:
+        return one is other
+    return _compare("==", _who(one, IDENTITY, span), _who(other, IDENTITY, span), span)
+
+
+def gathered_truth(op: str, gathered: OtherList, span: Span) -> Node:
+    """`any` ("or") or `all` ("and") of a list."""
+    wanted = to_boolean(gathered.value, span)
+    if op == "or":
+        body = _both((*gathered.conditions, wanted), span)
+        return _among(AmongOp.AT_LEAST, gathered.objects, gathered.element, body, span)
+    if gathered.conditions:
+        left_out = build.opposite(_both(gathered.conditions, span))
+        wanted = build.logic(LogicOp.OR, left_out, wanted, span=span)
+    return _among(AmongOp.EVERY, gathered.objects, gathered.element, wanted, span)
+
+
+def how_many(gathered: OtherList | LabelObjects, span: Span) -> Node:
+    """`len` of a list, or of all others."""
+    if isinstance(gathered, LabelObjects):
+        return _among(AmongOp.COUNT, gathered, _element(gathered, span), build.constant(True), span)
+    return _among(AmongOp.COUNT, gathered.objects, gathered.element, _both(gathered.conditions, span), span)
+
+
+_FILTERS = ("within",)
+
+
+def _class(
+    run: Interpreter, span: Span, name: str, args: tuple[ModelValue, ...], named: Mapping[str, ModelValue],
+    filters: tuple[str, ...],
+) -> ScenicClass:  # fmt: skip
+    """The class that a function is asked about, in a condition."""
+    if run.course is None:
+        raise fail("unsupported-construct", f"`{name}` can be asked in conditions only", span, "not in a condition",
+                   ("ask it in `require`, `terminate when`, or a monitor",))  # fmt: skip
+    unknown = [each for each in named if each not in filters]
+    if unknown:
+        given = f"`{name}` takes a class{''.join(f' and `{each}=`' for each in filters)}"
+        raise fail("wrong-arity", f"`{name}` has no `{unknown[0]}=`", span, "given here", (given,))
+    if len(args) != 1:
+        raise fail("wrong-arity", f"`{name}` takes one class", span, f"{len(args)} values are given")
+    if not isinstance(args[0], ScenicClass) or not args[0].derives_from("Object"):
+        raise fail("wrong-type", f"`{name}` needs a class of objects", span, f"this is {describe(args[0])}",
+                   (f"write `{name}(Car)`",))  # fmt: skip
+    return args[0]
+
+
+def _all_of(run: Interpreter, cls: ScenicClass, span: Span) -> LabelObjects:
+    """All of a class but the ego."""
+    return LabelObjects(cls, (_who(run.ego(span), TRACK, span),))
+
+
+def _who(each: Instance, name: str, span: Span) -> Feature:
+    return Feature(cast(int, each.index), name, "scalar", True, span=span)
+
+
+def _counting(named: Mapping[str, ModelValue], span: Span) -> Callable[[Instance], Node]:
+    def counts(element: Instance) -> Node:
+        if "within" not in named:
+            return build.constant(True)
+        # by its centre, as a point in the region
+        return operators.within(property_node(element, "position", span), named["within"], span)
+
+    return counts
+
+
+def _both(conditions: tuple[Node, ...], span: Span) -> Node:
+    conditions = tuple(each for each in conditions if not (isinstance(each, Constant) and each.value is True))
+    if not conditions:
+        return build.constant(True)
+    return conditions[0] if len(conditions) == 1 else build.logic(LogicOp.AND, *conditions, span=span)
+
+
+def _compare(op: str, left: Node, right: Node, span: Span) -> Node:
+    return cast(Node, operators.compare(op, left, right, span))
+
+
+def _among(
+    op: AmongOp, objects: LabelObjects, element: Instance, condition: Node, span: Span, *,
+    distance: Node | None = None, value: Node | None = None,
+) -> Node:  # fmt: skip
+    """Something about all of some label objects, closed over what is given from around.
+
+    Raises:
+        ScenarioError: unsupported-construct, where what is asked of each hangs on chance, or on a direction.
+    """
+    given: dict[int, Node] = {}
+    excluded = objects.excluded
+    asked = [each for each in (condition, distance, value) if each is not None]
+    closed = iter([_closed(each, cast(int, element.index), given, span) for each in asked])
+    body = Body(next(closed), *(None if each is None else next(closed) for each in (distance, value)))
+    inputs = (*excluded, *given.values())
+    chance = next((each for each in leaves(*inputs) if not isinstance(each, Index)), None)
+    if chance is not None:
+        raise fail("unsupported-construct", "what is asked of other label objects hangs on a random value", span,
+                   "random here", ("ask it of what labels observe",))  # fmt: skip
+    kind = kind_of(value) if value is not None else "scalar" if op is AmongOp.COUNT else "boolean"
+    return Among(op, objects.cls.category, body, kind, 1, len(excluded), inputs, span=span)
+
+
+def _closed(root: Node, element: int, given: dict[int, Node], span: Span) -> Node:
+    """An expression over an element as one of a body; what it takes from around is added to what is given.
+
+    Raises:
+        ScenarioError: unsupported-construct, for directions and choices at the place of the element.
+    """
+    depends: set[int] = set()
+    made: dict[int, Node] = {}
+
+    def part(node: Node) -> Node:
+        if id(node) in depends or isinstance(node, Constant):
+            return made.get(id(node), node)
+        if isinstance(node, Index):
+            raise fail("unsupported-construct", "which of several lanes other label objects are in cannot be asked",
+                       span, "at their places", ("ask whether they are in a region",))  # fmt: skip
+        given.setdefault(id(node), node)
+        number = list(given).index(id(node))
+        return Feature(GIVEN, str(number), kind_of(node), True, span=node.span)
+
+    for node in postorder((root,)):
+        below = children(node)
+        if isinstance(node, Feature) and node.object == element:
+            made[id(node)] = Feature(ELEMENT, node.property, node.kind, True, span=node.span)
+        elif any(id(each) in depends for each in below):
+            if isinstance(node, DirectionAt) or is_leaf(node):
+                what = "a direction" if isinstance(node, DirectionAt) else "a random value"
+                raise fail("unsupported-construct", f"{what} at the place of other label objects cannot be asked", span)
+            made[id(node)] = rebuild(node, tuple(map(part, below)))
+        else:
+            continue
+        depends.add(id(node))
+    return part(root)
