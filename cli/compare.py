@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from scenicq.query.execution.result_files import read_results
-from scenicq.report.changes import changes, changes_page, changes_text, check_datasets
+from scenicq.report.changes import changes, changes_page, changes_text, check_complete, check_datasets
 
 from .manual import Manual
 from .output import destination, writing
@@ -33,14 +33,15 @@ def report(before: Path, after: Path, *, every: bool, output: Path | None) -> No
     """Say which matches came, went and stayed between two result files.
 
     This shows what a changed line of a program did. With `match --all` the files also say why a frame does not match.
+    What one leaves open (a frame that is unknown, or that --limit, --deadline or --sample left out) is undecided.
     """
     old, new = read_results(before), read_results(after)
-    doubt = check_datasets(old, new)
-    if doubt is not None:
-        show([doubt])
+    doubt = check_datasets(old.records, new.records)
     found = changes(old, new)
+    doubts = [*([] if doubt is None else [doubt]), *check_complete(found, old, new)]
+    show(doubts)
     if output is None or str(output) == "-":
         say(plain(changes_text(found, every=every)))
         return
     with destination(output) as sink, writing(output):
-        sink.write(changes_page(found, (str(before), str(after))).encode())
+        sink.write(changes_page(found, (str(before), str(after)), doubts).encode())

@@ -16,8 +16,10 @@ import click
 from scenicq.match.verdict import NoMatch
 from scenicq.query.execution.records import record
 from scenicq.query.execution.result_origin import name_origin
+from scenicq.query.execution.result_summary import ResultCount, ResultSummary
 from scenicq.query.execution.results import Funnel, Result
 from scenicq.query.execution.run import Query
+from scenicq.query.execution.skipped_frames import summarize
 from scenicq.store.atomic_files import sole_writer
 
 from .formats import make_writer
@@ -52,27 +54,31 @@ class Wanted:
     ranked: bool = False
 
 
-def deliver(query: Query, results: Generator[Result], near: Iterable[Result], wanted: Wanted, bar: ProgressBar) -> None:
+def deliver(
+    query: Query, results: Generator[Result], near: Iterable[Result], wanted: Wanted, bar: ProgressBar
+) -> ResultSummary:
     """Take results, and then those that come close, and hand them on.
+
+    Returns:
+        What the results say of themselves.
 
     Raises:
         DataError: target-exists, target-busy or target-unwritable.
     """
     if wanted.report is None:
-        _deliver(query, results, near, wanted, bar)
-        return
+        return _deliver(query, results, near, wanted, bar)
     from scenicq.report.write import check_target  # noqa: PLC0415 - takes long to load
 
     check_target(wanted.report)
     with sole_writer(wanted.report):
-        _deliver(query, results, near, wanted, bar)
+        return _deliver(query, results, near, wanted, bar)
 
 
 def _deliver(
     query: Query, results: Generator[Result], near: Iterable[Result], wanted: Wanted, bar: ProgressBar
-) -> None:
+) -> ResultSummary:
     started = time.perf_counter()
-    unlisted = 0
+    unlisted, counted = 0, ResultCount()
     file, report = wanted.file, wanted.report
     origin = name_origin(query.dataset)
     exporter = None
@@ -94,14 +100,22 @@ def _deliver(
                 over_time=query.is_over_time(),
                 every=query.options.all_matches,
             )
-        for result in itertools.chain(_kept(results, shown), _kept(near, close)):
-            with bar.aside(), writing(file):
-                writer.write(record(result, origin, every=query.options.all_matches))
-            unlisted += wanted.form == "ids" and isinstance(result.verdict, NoMatch)
-            if exporter is not None:
-                exporter.add(result)
+        try:
+            for result in itertools.chain(_kept(results, shown), _kept(near, close)):
+                told = record(result, origin, every=query.options.all_matches)
+                with bar.aside(), writing(file):
+                    writer.write(told)
+                counted.add(told)
+                unlisted += wanted.form == "ids" and isinstance(result.verdict, NoMatch)
+                if exporter is not None:
+                    exporter.add(result)
+        except BaseException:
+            with contextlib.suppress(OSError):
+                writer.stop()
+            raise
+        summary = summarize(query, counted)
         with bar.aside(), writing(file):
-            writer.finish()
+            writer.finish(summary)
         if unlisted:
             what = "interval" if query.is_over_time() else "frame"
             told = f"`ids` lists {what}s that match: {count(unlisted, f'other {what}')} left out"
@@ -109,7 +123,7 @@ def _deliver(
                 click.echo(told, err=True)
         if exporter is not None:
             with bar.aside():
-                show_few(exporter.finish().left_out)
+                show_few(exporter.finish(summary).left_out)
     if report is not None:
         from scenicq.report.write import write_report  # noqa: PLC0415 - takes long to load
 
@@ -124,6 +138,7 @@ def _deliver(
             elapsed_s=elapsed_s,
             sensors=sensor_root(query.dataset, wanted.sensors),
         )
+    return summary
 
 
 def _kept(results: Iterable[Result], into: list[Result] | None) -> Iterator[Result]:
@@ -134,13 +149,13 @@ def _kept(results: Iterable[Result], into: list[Result] | None) -> Iterator[Resu
         yield result
 
 
-def exit_code(funnel: Funnel, limit: int | None = None) -> int:
+def exit_code(funnel: Funnel, summary: ResultSummary | None) -> int:
     """The exit code of a query: whether something matched, where all that was to be decided is.
 
     Args:
         funnel: Its counts.
-        limit: Matches after which it stopped.
+        summary: What its results say of themselves; None of shards that an older version wrote.
     """
-    if funnel.cut or funnel.unknowns or (limit is not None and funnel.matches >= limit):
+    if funnel.unknowns or (summary is not None and summary.skipped):
         return UNDECIDED
     return 0 if funnel.matches else NOTHING

@@ -20,7 +20,7 @@ from scenicq.evaluate.detection import Missing
 from scenicq.evaluate.evaluation import Evaluation, Results
 from scenicq.evaluate.evaluation import evaluate as judge
 from scenicq.evaluate.pages import write_pages
-from scenicq.evaluate.rows import COLUMNS, evaluation_record, flat_rows, overview, tables
+from scenicq.evaluate.rows import COLUMNS, evaluation_record, flat_rows, frame_counts, overview, tables
 from scenicq.option_values import MARGIN_OPTION, SCORE, SEED
 from scenicq.query.execution.option_texts import read_options
 from scenicq.query.execution.run import Query
@@ -47,8 +47,8 @@ _EXTENSIONS = {".json": "json"}
     cls=Manual,
     arguments={
         "RESULTS...": "Programs (.scenic), which are matched, or files that `match -o` wrote, one a scenario: .jsonl, "
-        ".csv or .parquet. All matches must be there (no --limit, --sample): other frames count as those that do not "
-        "match. With `match --all-matches` all who can play a role are known; else nobody else of a frame that matches "
+        ".csv or .parquet. Frames of which they do not say whether they match (--limit, --sample, --deadline) are left "
+        "out. With `match --all-matches` all who can play a role are known; else nobody else of a frame that matches "
         "is compared.",
         "DATASET": "The dataset that they are of.",
     },
@@ -174,7 +174,7 @@ def _text(found: Evaluation) -> str:
         title, head, rows = overview(found)
         lines += [title, *columns([head, *rows]), ""]
     for each in found.scenarios:
-        lines.append(f"{each.name}: {each.matching:,} frames match, {each.other:,} do not")
+        lines.append(f"{each.name}: {frame_counts(each)}")
         for title, head, rows in tables(each, found.distance_m):
             lines += ["", title, *columns([head, *rows])]
         lines.append("")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import Any
 
@@ -15,33 +14,20 @@ from scenicq.query.execution.lazy_solver import LazySolver
 from scenicq.query.execution.run import Query
 from scenicq.query.explain.frame_explanation import explain as explain_label
 from scenicq.query.explain.frame_explanation import show_explanation
-from scenicq.query.explain.interval_explanation import explain_recording
-from scenicq.store.frame_names import find_recording
+from scenicq.query.explain.interval_explanation import explain_beginning, explain_recording
+from scenicq.query.explain.moments import named_frame, named_moment
 
 from .datasets import open_checked
 from .main import NOTHING, UNDECIDED
 from .manual import Manual
 from .match import match
-from .options import ONE_FRAME, SHARED, query_options
+from .options import ONE_FRAME, OVER_TIME, SHARED, query_options
 from .programs import PROGRAM_TEXT, SCENARIO, given_program
 from .remarks import remarks, show_remarks
 from .report import plain
 from .streams import say
 
 __all__ = ["explain"]
-
-
-def _recording(query: Query, named: str) -> tuple[str, int | float | None] | None:
-    """The recording and the timestamp in microseconds, or seconds in it, that are named, if it is not a frame."""
-    recordings = query.dataset.manifest.by_recording
-    begun, at, time = named.rpartition("@")
-    if at and named not in recordings and (name := find_recording(recordings, begun)) is not None:
-        if time.isdecimal():
-            return name, int(time)
-        if re.fullmatch(r"\d+(\.\d+)? ?s", time, re.ASCII):
-            return name, float(time.removesuffix("s"))
-    name = find_recording(recordings, named)
-    return None if name is None else (name, None)
 
 
 @click.command(
@@ -51,19 +37,21 @@ def _recording(query: Query, named: str) -> tuple[str, int | float | None] | Non
         "DATASET": "A folder that `scenicq ingest` made.",
         "FRAME": "The name of a frame, as `scenicq match` prints it, or as much of it as no other frame has; of a "
         "program about what happens over time the frame in which the interval begins, or the name of a recording, and "
-        "after `@` when the interval begins: a timestamp, or the seconds from where the recording begins (`@3.5s`).",
+        "after `@` when the interval begins: a timestamp, or the seconds from where the recording begins (`@3.5s`). "
+        "Intervals in which a frame lies without being their first are named, too.",
     },
     exits={
         0: "the frame or recording matches",
         1: "it does not match (with --exit-zero: 0)",
         3: "that is unknown (with --exit-zero: 0)",
     },
-    topics={"What counts as a match": SHARED},
+    topics={"What counts as a match": SHARED, "Over time": OVER_TIME},
     epilog="\b\nExamples:\n"
     "  scenicq explain crossing.scenic dataset 1a2b3c\n"
     "  scenicq explain crossing.scenic dataset 1a2b3c --tolerance position=0.5,heading=5deg --smt2 formulas\n"
     "  scenicq explain cut_in.scenic dataset scene-0061@1532402928147847\n"
-    "  scenicq explain cut_in.scenic dataset scene-0061@3.5s",
+    "  scenicq explain cut_in.scenic dataset scene-0061@3.5s\n"
+    "  scenicq explain following.scenic dataset scene-0061 --min-duration 5",
 )
 @click.argument("scenario", metavar="SCENARIO", type=click.Path(), required=False)
 @click.argument("dataset", metavar="DATASET", type=click.Path(), required=False)
@@ -82,28 +70,23 @@ def explain(
     The explanation names the feature or requirement, its place in the program, and the label's value.
     """
     source, (target, named), model = given_program(ctx, program, (scenario, dataset, frame), 2)
-    query = Query(open_checked(str(target)), source, query_options({**given, **ONE_FRAME, "model": model}))
-    if query.is_over_time() and (recording := _recording(query, str(named))) is not None:
+    query = Query(open_checked(str(target)), source, query_options({**ONE_FRAME, **given, "model": model}))
+    over_time = query.is_over_time()
+    if over_time and (moment := named_moment(query.dataset, str(named))) is not None:
         with LazySolver(query.options.solver) as solver:
-            told = explain_recording(query, solver, *recording)
-        say(plain(told.text()))
-        if not told.matches and not exit_zero:
-            ctx.exit(UNDECIDED if told.is_unknown else NOTHING)
+            about = explain_recording(query, solver, *moment)
+        say(plain(about.text()))
+        if not about.matches and not exit_zero:
+            ctx.exit(UNDECIDED if about.is_unknown else NOTHING)
         return
-    label = query.dataset.label(str(named))
+    label = named_frame(query.dataset, str(named))
     show_remarks(query, *remarks(query, [label.map]))
     with LazySolver(query.options.solver) as solver:
         matcher = Matcher(query.compile(label.map)[0], query.options.match, solver)
         explanation = explain_label(matcher, label, formulas=smt2 is not None)
-        matches, told = isinstance(explanation.verdict, Match), show_explanation(explanation)
-        unknown = isinstance(explanation.verdict, Unknown)
-        if query.is_over_time():
-            begun = explain_recording(query, solver, label.recording, label.timestamp_us)
-            # without a start, the frame itself is what keeps it from matching
-            if begun.interval is None:
-                matches = False
-            else:
-                matches, unknown, told = begun.matches, begun.is_unknown, begun.text()
+        verdict, told = explanation.verdict, show_explanation(explanation)
+        if over_time:
+            verdict, told = explain_beginning(query, solver, label)
     say(plain(told))
     if smt2 is not None:
         try:
@@ -112,8 +95,8 @@ def explain(
                 (smt2 / f"{formula.name}.smt2").write_text(formula.text, encoding="utf-8")
         except OSError as error:
             raise DataError(Diagnostic("target-unwritable", f"{smt2} cannot be written: {error.strerror}")) from None
-    if not matches and not exit_zero:
-        ctx.exit(UNDECIDED if unknown else NOTHING)
+    if not isinstance(verdict, Match) and not exit_zero:
+        ctx.exit(UNDECIDED if isinstance(verdict, Unknown) else NOTHING)
 
 
-explain.params += [option for option in match.params if option.name in SHARED]
+explain.params += [option for option in match.params if option.name in SHARED | OVER_TIME]

@@ -10,12 +10,13 @@ import csv
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any, BinaryIO, Protocol, TextIO
 
-from msgspec import UNSET
+from msgspec import UNSET, structs
 
 from scenicq.errors import plain_json
 from scenicq.query.execution.csv_cells import SPREADSHEET_MARK, quote_cell
-from scenicq.query.execution.records import DENSITY, FrameRecord, IntervalRecord, Record, json_text
-from scenicq.query.execution.result_tables import result_schema, result_table
+from scenicq.query.execution.records import DENSITY, FrameRecord, IntervalRecord, Record, SummaryRecord, json_text
+from scenicq.query.execution.result_summary import ResultSummary
+from scenicq.query.execution.result_tables import result_schema, result_table, summary_metadata
 from scenicq.store.frame_names import ShortNames
 
 from .report import plain
@@ -39,29 +40,59 @@ class Writer(Protocol):
         """Write one result."""
         ...
 
-    def finish(self) -> None:
-        """Write what is held back."""
+    def finish(self, summary: ResultSummary | None = None) -> None:
+        """Write what is held back, and what all results say of themselves where the format has a place for it.
+
+        Args:
+            summary: What they say.
+        """
+        ...
+
+    def stop(self) -> None:
+        """The query is broken off: what was taken goes out where the format has a place for it."""
         ...
 
 
-class _Lines:
-    """One line a result: JSON, or the name of a frame, or the recording and start of an interval, that matches."""
+class _Names:
+    """One line a frame that matches: its name, or the recording and start of an interval."""
 
-    def __init__(self, text: TextStream, line: Callable[[Record], str | None]) -> None:
-        self._text, self._line = text, line
+    def __init__(self, text: TextStream) -> None:
+        self._text = text
 
     def write(self, record: Record) -> None:
-        line = self._line(record)
-        if line is not None:
-            self._text.write(line + "\n")
+        if record.verdict == "match":
+            self._text.write(plain(record.name).replace("\n", "\\n") + "\n")
             self._text.flush()
 
-    def finish(self) -> None:
+    def finish(self, summary: ResultSummary | None = None) -> None:
         self._text.flush()
 
+    def stop(self) -> None:
+        pass
 
-def _name(record: Record) -> str | None:
-    return plain(record.name).replace("\n", "\\n") if record.verdict == "match" else None
+
+class _HeldBack:
+    """Writes each result when the next one comes, as the last one carries the summary: a line stays a result."""
+
+    def __init__(self, text: TextStream, write: Callable[[Record | SummaryRecord], None]) -> None:
+        self._text, self._write = text, write
+        self._last: Record | None = None
+
+    def write(self, record: Record) -> None:
+        last, self._last = self._last, record
+        if last is not None:
+            self._write(last)
+
+    def finish(self, summary: ResultSummary | None = None) -> None:
+        last, self._last = self._last, None
+        if last is not None:
+            self._write(last if summary is None else structs.replace(last, summary=summary))
+        elif summary is not None and not summary.complete:
+            self._write(SummaryRecord(summary))
+        self._text.flush()
+
+    def stop(self) -> None:
+        self.finish()
 
 
 class CsvRows:
@@ -86,6 +117,17 @@ class CsvRows:
         self._rows.writerow({name: quote_cell(value, spreadsheet=self._spreadsheet) for name, value in row.items()})
 
 
+class _JsonLines:
+    """A line of JSON a result."""
+
+    def __init__(self, text: TextStream) -> None:
+        self._text = text
+
+    def write(self, record: Record | SummaryRecord) -> None:
+        self._text.write(plain_json(json_text(record)) + "\n")
+        self._text.flush()
+
+
 class _Csv:
     """A row a result, with a column a field; nested values and truth values are JSON."""
 
@@ -93,9 +135,10 @@ class _Csv:
         self._text, self._names = text, names
         self._rows = CsvRows(text, names, spreadsheet=spreadsheet)
 
-    def write(self, record: Record) -> None:
-        cells = {name: getattr(record, name) for name in self._names}
-        cells["cause"] = cells["cause"] or {}
+    def write(self, record: Record | SummaryRecord) -> None:
+        cells = {name: getattr(record, name, UNSET) for name in self._names}
+        if not isinstance(record, SummaryRecord):
+            cells["cause"] = cells["cause"] or {}
         self._rows.write(
             {
                 name: None
@@ -106,9 +149,6 @@ class _Csv:
                 for name, cell in cells.items()
             }
         )
-        self._text.flush()
-
-    def finish(self) -> None:
         self._text.flush()
 
 
@@ -130,9 +170,14 @@ class _Parquet:
         self._file.write_table(result_table(self._rows, self._schema))
         self._rows.clear()
 
-    def finish(self) -> None:
+    def finish(self, summary: ResultSummary | None = None) -> None:
         self._spill()
+        if summary is not None:
+            self._file.add_key_value_metadata(summary_metadata(summary))
         self._file.close()
+
+    def stop(self) -> None:
+        pass
 
 
 def make_writer(
@@ -169,8 +214,8 @@ def make_writer(
             left_out = {name for name, there in absent.items() if not there}
             kind = IntervalRecord if over_time else FrameRecord
             names = tuple(name for name in kind.__struct_fields__ if name not in left_out)
-            return _Csv(text, names, spreadsheet=name == "spreadsheet")
+            return _HeldBack(text, _Csv(text, names, spreadsheet=name == "spreadsheet").write)
         case "ids":
-            return _Lines(text, _name)
+            return _Names(text)
         case _:
-            return _Lines(text, lambda record: plain_json(json_text(record)))
+            return _HeldBack(text, _JsonLines(text).write)

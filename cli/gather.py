@@ -58,7 +58,7 @@ def gather(ctx: click.Context, folder: Path, *, format_: str | None, output: Pat
         results = (read_record(each, query.source) for each in gathered.records())
         deliver(query, results, (), Wanted(file, form, export, report, sensors=sensors), ProgressBar(quiet=True))
     if not exit_zero:
-        ctx.exit(exit_code(gathered.funnel))
+        ctx.exit(exit_code(gathered.funnel, gathered.summary))
 
 
 def _write(gathered: Gathered, file: Path | None, form: str) -> None:
@@ -70,4 +70,4 @@ def _write(gathered: Gathered, file: Path | None, form: str) -> None:
                              every=every)  # fmt: skip
         for each in gathered.records():
             writer.write(each)
-        writer.finish()
+        writer.finish(gathered.summary)

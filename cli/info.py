@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import textwrap
 from collections.abc import Mapping, Sequence
+from contextlib import closing
 
 import click
 
@@ -13,7 +14,7 @@ from scenicq.store.dataset import Dataset
 from scenicq.store.manifest import Counts, Manifest
 from scenicq.store.map_fit import MapFit, map_fits, misfits
 from scenicq.store.motion import LONGEST_GAP_US
-from scenicq.store.observed_motion import observed_motion
+from scenicq.store.observed_motion import ObservedMotion, observed_motion
 from scenicq.store.schema import SCHEMAS
 from scenicq.store.soundness import check_dataset
 from scenicq.store.verification import verify_computed
@@ -38,29 +39,73 @@ def _counted(title: str, counts: Mapping[str, Counts]) -> list[str]:
     return [*columns([(title, "frames", "objects"), *rows], right=frozenset({1, 2}), indent=""), *more, ""]
 
 
-def _classes(manifest: Manifest) -> list[str]:
-    rows = sorted(manifest.by_class.items(), key=lambda item: (-item[1], item[0]))
-    return [*columns([("CLASS", "objects"), *((n, f"{c:,}") for n, c in rows)], right=frozenset({1}), indent=""), ""]
+def _classes(dataset: Dataset) -> list[str]:
+    """How many objects of each class there are, and in how many frames it is the ego's."""
+    with closing(dataset.connect()) as connection:
+        egos: dict[str, int] = dict(
+            connection.execute("SELECT ego_class, count(*) FROM labels WHERE ego_class <> '' GROUP BY ALL").fetchall()
+        )
+    objects = dataset.manifest.by_class
+    names = sorted({*objects, *egos}, key=lambda name: (-objects.get(name, 0), name))
+    rows = [(name, f"{objects.get(name, 0):,}", f"{egos[name]:,}" if name in egos else "") for name in names]
+    head = ("CLASS", "objects", "frames with such an ego")
+    return [*columns([head, *rows], right=frozenset({1, 2}), indent=""), ""]
 
 
-def _tables(manifest: Manifest) -> list[str]:
+def _questions(dataset: Dataset, observed: ObservedMotion) -> list[str]:
+    """What can be asked, and what not."""
+    manifest = dataset.manifest
+    rows = {name: sum(part.rows for part in parts) for name, parts in manifest.tables.items()}
+    without_map = sorted(set(manifest.by_map) - set(manifest.maps))
+    if observed.steps is None:
+        over_time = "no, as no recording has two labels"
+    elif not manifest.tracks:
+        over_time = "of the ego alone, as objects have no tracks"
+    else:
+        over_time = f"yes, by {count(manifest.tracks, 'track')}"
+    roads = f"yes, {count(rows['lanes'], 'lane')}" if rows["lanes"] else "no, as there is no map with lanes"
+    if rows["lanes"] and without_map:
+        roads += f"; not on {', '.join(without_map)}, of which there is no map"
+    known = observed.known.get("velocity of objects")
+    share = (known.own + known.derived) / known.total if known is not None and known.total else 0.0
+    told = [
+        ("what happens over time", over_time),
+        ("roads and lanes", roads),
+        ("speeds of objects", f"yes, of {share:.0%}" if share else "no, as none is known"),
+        ("sensor files", f"yes, {count(rows['sensors'], 'path')}" if rows["sensors"] else "no, as none is named"),
+    ]
+    return [*columns([("CAN BE ASKED", ""), *told], indent=""), ""]
+
+
+def _tables(manifest: Manifest, *, named: bool) -> list[str]:
     rows = [("TABLE", "rows", "files", "MB")]
     for name, parts in manifest.tables.items():
         size = sum(part.bytes for part in parts) / 1e6
         rows.append((name, f"{sum(part.rows for part in parts):,}", f"{len(parts):,}", f"{size:,.2f}"))
     every = [part for parts in manifest.tables.values() for part in parts]
     rows.append(("all", "", f"{len(every):,}", f"{sum(part.bytes for part in every) / 1e6:,.2f}"))
+    found = [*columns(rows, right=frozenset({1, 2, 3}), indent=""), ""]
+    if not named:
+        return [*found[:-1], "`--columns` lists the columns that SQL can ask", ""]
     width = max(map(len, SCHEMAS)) + 2
-    named: list[str] = []
+    listed: list[str] = []
     for name in manifest.tables:
         indent = " " * width
-        named += textwrap.wrap(", ".join(SCHEMAS[name].names), 110, initial_indent=name.ljust(width),
+        listed += textwrap.wrap(", ".join(SCHEMAS[name].names), 110, initial_indent=name.ljust(width),
                                subsequent_indent=indent, break_on_hyphens=False)  # fmt: skip
-    return [*columns(rows, right=frozenset({1, 2, 3}), indent=""), "", f"{'TABLE'.ljust(width)}columns", *named, ""]
+    return [*found, f"{'TABLE'.ljust(width)}columns", *listed, ""]
 
 
-def _motion(dataset: Dataset) -> list[str]:
-    observed = observed_motion(dataset)
+def _rate(observed: ObservedMotion) -> str:
+    """How often there is a label."""
+    steps = observed.steps
+    if steps is None:
+        return "no recording has two labels: nothing can be matched over time"
+    between = f"{steps.median:.3g} s from one to the next ({steps.shortest:.3g} to {steps.longest:.3g})"
+    return f"{1 / steps.median:.3g} labels a second: {between}"
+
+
+def _motion(dataset: Dataset, observed: ObservedMotion) -> list[str]:
     rows = [("MOTION", "labels' own", "from tracks", "unknown")]
     for name, known in observed.known.items():
         own, derived, unknown = (f"{each / known.total:.1%}" for each in (known.own, known.derived, known.unknown))
@@ -69,12 +114,7 @@ def _motion(dataset: Dataset) -> list[str]:
     facts = dataset.manifest.provenance.facts
     if "velocity" in facts:
         found.append(f"velocity of labels: {facts['velocity']}")
-    steps, gaps = observed.steps, observed.gaps
-    if steps is None:
-        found.append("no recording has two labels: nothing can be matched over time")
-    else:
-        between = f"{steps.median:.3g} s from one to the next ({steps.shortest:.3g} to {steps.longest:.3g})"
-        found.append(f"{1 / steps.median:.3g} labels a second: {between}")
+    gaps = observed.gaps
     found.append(
         f"over {LONGEST_GAP_US / 1e6:g} s without a label: {count(gaps.recordings, 'gap')} in recordings, "
         f"{count(gaps.tracks, 'gap')} in tracks"
@@ -104,8 +144,8 @@ def _fit(fits: Sequence[MapFit], maps: int) -> list[str]:
     return [*columns(rows, right=frozenset({1, 2, 3, 4}), indent=""), *more, ""]
 
 
-def _lines(dataset: Dataset, fits: Sequence[MapFit]) -> list[str]:
-    manifest = dataset.manifest
+def _lines(dataset: Dataset, fits: Sequence[MapFit], *, named: bool) -> list[str]:
+    manifest, observed = dataset.manifest, observed_motion(dataset)
     span = manifest.span_us
     made = manifest.provenance
     versions = ", ".join(f"{name} {number}" for name, number in made.versions.items())
@@ -115,16 +155,18 @@ def _lines(dataset: Dataset, fits: Sequence[MapFit]) -> list[str]:
         f"{manifest.name}: {count(manifest.total.frames, 'frame')}, {count(manifest.total.objects, 'object')}, "
         f"{count(manifest.tracks, 'track')} in {count(len(manifest.by_recording), 'recording')}",
         *([f"from {moment(span[0])} to {moment(span[1])} ({clock})"] if span else []),
+        _rate(observed),
         f"read as {manifest.importer} from {made.source} on {made.time}",
         f"with {versions}",
         "",
-        *_classes(manifest),
+        *_questions(dataset, observed),
+        *_classes(dataset),
         *_counted("MAP", manifest.by_map),
         *([f"no map for: {', '.join(without_map)}", ""] if without_map else []),
         *_fit(fits, len(dataset.maps)),
         *_counted("RECORDING", manifest.by_recording),
-        *_motion(dataset),
-        *_tables(manifest),
+        *_motion(dataset, observed),
+        *_tables(manifest, named=named),
         *(defects(manifest.left_out) or ["nothing was left out"]),
     ]
 
@@ -140,9 +182,10 @@ def _lines(dataset: Dataset, fits: Sequence[MapFit]) -> list[str]:
     is_flag=True,
     help="Compare every file with its checksum, look at every value, and compute anew what was computed at ingest.",
 )
+@click.option("--columns", "named", is_flag=True, help="List the columns of the tables, too.")
 @click.option("--format", "format_", type=click.Choice(["text", "json"]), default="text",
               help="json gives the whole manifest.")  # fmt: skip
-def info(dataset: str, *, verify: bool, format_: str) -> None:
+def info(dataset: str, *, verify: bool, named: bool, format_: str) -> None:
     """Say what a dataset holds and what was left out of it."""
     opened = open_checked(dataset)
     if verify:
@@ -159,7 +202,7 @@ def info(dataset: str, *, verify: bool, format_: str) -> None:
             plain(
                 "\n".join(
                     [
-                        *_lines(opened, fits),
+                        *_lines(opened, fits, named=named),
                         *(["every checksum is right, and every value is sound"] if verify else []),
                     ]
                 )

@@ -17,9 +17,10 @@ import click
 
 from scenicq.errors import Diagnostic
 from scenicq.exporters.forms import FORMS
-from scenicq.match.verdict import Match
+from scenicq.match.verdict import Match, Unknown
 from scenicq.option_values import Amount, Count
-from scenicq.query.execution.results import Result
+from scenicq.query.execution.result_summary import ResultSummary
+from scenicq.query.execution.results import Result, Sample
 from scenicq.query.execution.run import Query
 from scenicq.query.execution.shards import Engine, in_order, kept, run_here, shards_of
 from scenicq.store.atomic_files import sole_writer
@@ -197,11 +198,13 @@ def match(ctx: click.Context, scenario: str | None, dataset: str | None, *, prog
             show_remarks(query, told, found)
     if shard is not None and file is not None:
         try:
-            query.funnel = replace(run_shard(query, shard, file, quiet=quiet), warnings=query.funnel.warnings)
+            funnel, said = run_shard(query, shard, file, quiet=quiet)
         except LateShardError as error:
             show(error.diagnostics)
             ctx.exit(0 if exit_zero else UNDECIDED)
-        _conclude(ctx, query, told, time.perf_counter() - started, summary=summary, quiet=quiet, exit_zero=exit_zero)
+        query.funnel = replace(funnel, warnings=query.funnel.warnings)
+        _conclude(ctx, query, told, said, time.perf_counter() - started, summary=summary, quiet=quiet,
+                  exit_zero=exit_zero)  # fmt: skip
         return
     pieces = None
     again = "the same command goes on from here" if resume else "`--resume` keeps what is done until it stops"
@@ -218,7 +221,7 @@ def match(ctx: click.Context, scenario: str | None, dataset: str | None, *, prog
     came_close: list[str] = []
     with contextlib.nullcontext() if pieces is None else sole_writer(pieces):
         try:
-            deliver(query, results, _noted(_near(query, near), came_close), wanted, bar)
+            said = deliver(query, results, _noted(_near(query, near), came_close), wanted, bar)
         except BaseException:
             if pieces is not None:
                 with contextlib.suppress(OSError):
@@ -233,13 +236,12 @@ def match(ctx: click.Context, scenario: str | None, dataset: str | None, *, prog
         _tell_far(query)
     cut = [each for each in query.funnel.warnings if each.code in ("ranking-cut", "no-density")]
     show(cut)
-    limit = query.options.limit
-    reached = limit is not None and query.funnel.matches >= limit
-    whole = not reached and not query.funnel.cut and not query.funnel.over_time
+    whole = not said.skipped and not query.funnel.over_time
     if advised or (not quiet and whole and is_nearly_empty(query)):
         advise(query, asked=advised, near=near is not None)
     told = [*told, *cut]
-    _conclude(ctx, query, told, time.perf_counter() - started, summary=summary, quiet=quiet, exit_zero=exit_zero)
+    elapsed_s = time.perf_counter() - started
+    _conclude(ctx, query, told, said, elapsed_s, summary=summary, quiet=quiet, exit_zero=exit_zero)
 
 
 def _noted(found: Iterable[Result], recordings: list[str]) -> Iterator[Result]:
@@ -274,8 +276,10 @@ def _selected(
     with contextlib.closing(results):
         found = list(results)
     if sample is not None:
-        found = [each for each in found if isinstance(each.verdict, Match)]
-        found = sample_diverse(found, sample) if diverse else sample_plain(found, sample)
+        unknown = Counter(each.verdict.reason for each in found if isinstance(each.verdict, Unknown))
+        matching = [each for each in found if isinstance(each.verdict, Match)]
+        found = sample_diverse(matching, sample) if diverse else sample_plain(matching, sample)
+        query.funnel.sample = Sample(len(found), len(matching), unknown)
     if rank:
         found = rank_results(query, found)
         query.funnel.warnings += _without_density(found)
@@ -294,6 +298,7 @@ def _conclude(
     ctx: click.Context,
     query: Query,
     told: Collection[Diagnostic],
+    said: ResultSummary | None,
     elapsed_s: float,
     *,
     summary: bool,
@@ -304,4 +309,4 @@ def _conclude(
     if summary or (sys.stderr.isatty() and not quiet):
         show_funnel(query, elapsed_s, told)
     if not exit_zero:
-        ctx.exit(exit_code(query.funnel, query.options.limit))
+        ctx.exit(exit_code(query.funnel, said))

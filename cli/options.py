@@ -14,7 +14,7 @@ from scenicq.temporal.interval_options import DEFAULT_GAP_S
 
 from .option_type import OptionType
 
-__all__ = ["DEFAULTS", "ONE_FRAME", "SHARED", "TOPICS", "option_type", "query_options"]
+__all__ = ["DEFAULTS", "ONE_FRAME", "OVER_TIME", "SHARED", "TOPICS", "option_type", "query_options"]
 
 DEFAULTS = MatchOptions()
 """What counts as a match unless options say otherwise."""
@@ -23,6 +23,8 @@ SHARED = frozenset({
     "initial", "map_defaults", "behaviors", "ignore_params", "strict",
 })  # fmt: skip
 """Options of `match` that say what a match is; the others say which frames and what to show of them."""
+OVER_TIME = frozenset({"min_duration", "gap"})
+"""Options of `match` that say what an interval is."""
 TOPICS = {
     "What counts as a match": SHARED - {"solver", "method", "timeout", "budget", "strict", "behaviors"},
     "Over time": {"behaviors", "min_duration", "intervals", "gap"},

@@ -12,6 +12,7 @@ from scenicq.query.execution.partitions import gather, is_done, partitions, writ
 from scenicq.query.execution.question_notes import name_question, note_question
 from scenicq.query.execution.records import Record, record
 from scenicq.query.execution.result_origin import name_origin
+from scenicq.query.execution.result_summary import ResultSummary
 from scenicq.query.execution.results import Funnel
 from scenicq.query.execution.run import Query
 
@@ -54,16 +55,17 @@ def _whole(query: Query, shard: Shard, folder: Path, bar: ProgressBar) -> Iterat
     note_question(folder, query)
 
 
-def run_shard(query: Query, shard: Shard, folder: Path, *, quiet: bool) -> Funnel:
-    """Match one shard into a folder, unless it is there already; what it found is counted."""
+def run_shard(query: Query, shard: Shard, folder: Path, *, quiet: bool) -> tuple[Funnel, ResultSummary | None]:
+    """Match one shard into a folder, unless it is there already; what it found is counted, and says of itself."""
     number, count = shard
     question = name_question(query)
     pieces = partitions(query.dataset, count)
     if number > len(pieces):
-        return Funnel()  # fewer recordings than shards: nothing is left for this one
+        return Funnel(), None  # fewer recordings than shards: nothing is left for this one
     piece = pieces[number - 1]
     if not is_done(folder, question, piece.number, piece.count):
         query.recordings = piece.recordings
         with ProgressBar(piece.frames, quiet=quiet) as bar:
-            write_partition(folder, question, piece, _whole(query, shard, folder, bar), query.funnel)
-    return gather(folder, question, only=piece.number).funnel
+            write_partition(folder, question, piece, _whole(query, shard, folder, bar), query)
+    gathered = gather(folder, question, only=piece.number)
+    return gathered.funnel, gathered.summary

@@ -11,9 +11,11 @@ from scenicq.errors import DataError, Diagnostic
 from scenicq.match.matcher import Matcher
 from scenicq.match.verdict import Unknown
 from scenicq.option_values import HALF, WIDTH
+from scenicq.query.execution.interval_frames import verdict_at
 from scenicq.query.execution.lazy_solver import LazySolver
 from scenicq.query.execution.run import Query
 from scenicq.query.explain.frame_explanation import explain
+from scenicq.query.explain.moments import intervals_around, named_frame
 from scenicq.report.backdrop import Backdrop
 from scenicq.report.frames import frame_page
 from scenicq.report.picture import Shot, Style, draw
@@ -26,7 +28,7 @@ from .datasets import open_checked
 from .manual import Manual
 from .match import match
 from .option_type import OptionType
-from .options import ONE_FRAME, SHARED, query_options
+from .options import ONE_FRAME, OVER_TIME, SHARED, query_options
 from .output import destination, writing
 from .programs import read_scenario
 from .remarks import remarks, show_remarks
@@ -53,9 +55,11 @@ def _kind(output: Path | None) -> str:
 def _shot(dataset: Dataset, label: Label, scenario: Path | None, given: dict[str, Any]) -> tuple[Shot, Backdrop]:
     if scenario is None:
         return Shot(label), Backdrop(dataset.network(label.map))
-    query = Query(dataset, read_scenario(scenario), query_options({**given, **ONE_FRAME}))
+    query = Query(dataset, read_scenario(scenario), query_options({**ONE_FRAME, **given}))
     show_remarks(query, *remarks(query, [label.map]))
     compiled, network = query.compile(label.map)
+    if query.is_over_time() and (around := intervals_around(query, label)):
+        return Shot(label, compiled, verdict_at(label, around[0])), Backdrop(network)
     with LazySolver(query.options.solver) as solver:
         matcher = Matcher(compiled, query.options.match, solver)
         verdict = matcher.match(label)
@@ -67,12 +71,14 @@ def _shot(dataset: Dataset, label: Label, scenario: Path | None, given: dict[str
     cls=Manual,
     arguments={
         "DATASET": "A folder that `scenicq ingest` made.",
-        "FRAME": "The name of a frame, as `scenicq match` prints it, or as much of it as no other frame has.",
+        "FRAME": "The name of a frame, as `scenicq match` prints it, or as much of it as no other frame has; or of a "
+        "recording, and after `@` a timestamp, or the seconds from where the recording begins (`@3.5s`).",
     },
-    topics={"What counts as a match, with --scenario": SHARED},
+    topics={"What counts as a match, with --scenario": SHARED, "Over time": OVER_TIME},
     epilog="\b\nExamples:\n"
     "  scenicq show dataset 1a2b3c -o frame.svg\n"
     "  scenicq show dataset 1a2b3c --scenario crossing.scenic -o frame.html\n"
+    "  scenicq show dataset scene-0061@3.5s --scenario cut_in.scenic -o frame.svg\n"
     "  scenicq show dataset 1a2b3c --scenario crossing.scenic --half 30 -o frame.png",
 )
 @click.argument("dataset", type=click.Path())
@@ -82,7 +88,7 @@ def _shot(dataset: Dataset, label: Label, scenario: Path | None, given: dict[str
     metavar="FILE",
     type=click.Path(path_type=Path),
     help="Show what this scenario says of the frame: roles, where each may be and which way it may face, hidden "
-    "points, and in red what excludes it.",
+    "points, and in red what excludes it. Over time the roles are those of the interval in which the frame lies.",
 )
 @click.option(
     "-o",
@@ -108,7 +114,7 @@ def show(dataset: str, frame: str, *, scenario: Path | None, output: Path | None
     file = None if output is None or str(output) == "-" else output
     kind = _kind(file)
     opened = open_checked(dataset)
-    shot, backdrop = _shot(opened, opened.label(frame), scenario, given)
+    shot, backdrop = _shot(opened, named_frame(opened, frame), scenario, given)
     picture = draw(shot, backdrop, half=half, pixels=width, style=_STYLES[kind], captioned=kind != ".html")
     match kind:
         case ".png":
@@ -126,4 +132,4 @@ def show(dataset: str, frame: str, *, scenario: Path | None, output: Path | None
         say()
 
 
-show.params += [option for option in match.params if option.name in SHARED]
+show.params += [option for option in match.params if option.name in SHARED | OVER_TIME]

@@ -11,6 +11,7 @@ import click
 from msgspec import UNSET
 
 from scenicq.query.execution.records import CauseRecord, IntervalRecord, Record
+from scenicq.query.execution.result_summary import ResultSummary
 from scenicq.store.frame_names import ShortNames
 
 from .report import columns, moment, plain
@@ -77,8 +78,11 @@ class Table:
         if len(self._rows) >= _BLOCK:
             self.finish()
 
-    def finish(self) -> None:
-        """Write the rows that are held back."""
+    def stop(self) -> None:
+        """The rows that are held back stay there."""
+
+    def finish(self, summary: ResultSummary | None = None) -> None:
+        """Write the rows that are held back; a table is for people, whom standard error tells the rest."""
         if not self._rows:
             return
         lines = columns([_INTERVAL_HEAD if self._over_time else _HEAD, *self._rows], indent="")

@@ -80,6 +80,7 @@ CODES: dict[str, str] = {
     "target-unwritable": "the target cannot be written",
     "resources-exhausted": "the system gives no more memory, files or processes",
     "deadline-passed": "the time that a run may take was over before all frames were decided, or a scene drawn",
+    "results-incomplete": "results do not say of every frame whether it matches, or nobody knows whether they do",
     "ranking-cut": "a ranking has not looked at all that may be among the closest",
     "predictions-invalid": "a predicted box has a value that makes no sense",
     "predictions-duplicate": "a predicted box or frame is there more than once",

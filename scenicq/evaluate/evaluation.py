@@ -29,11 +29,13 @@ from scenicq.evaluate.weighting import Weighted, weigh
 from scenicq.importers.prediction_files import read_predictions
 from scenicq.importers.predictions import THRESHOLDS_M, Predictions
 from scenicq.option_values import MARGIN_OPTION, SCORE, SEED, OneOf, read_option
-from scenicq.query.execution.records import FrameRecord, IntervalRecord, Record, record, record_of
-from scenicq.query.execution.result_files import read_records
+from scenicq.query.execution.records import FrameRecord, IntervalRecord, Record, SummaryRecord, record, record_of
+from scenicq.query.execution.result_files import RecordStream, read_records
 from scenicq.query.execution.result_origin import check_origins, name_origin
+from scenicq.query.execution.result_summary import Completeness, ResultCount
 from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query
+from scenicq.query.execution.skipped_frames import summarize
 from scenicq.store.dataset import Dataset
 
 __all__ = ["Evaluation", "ScenarioEvaluation", "WorstFrame", "evaluate"]
@@ -73,7 +75,7 @@ class ScenarioEvaluation:
 
     Attributes:
         name: Of the scenario.
-        matching, other: Numbers of frames.
+        matching, other, undecided: Numbers of frames: of the last nobody knows whether they match.
         roles: How often the objects of each role are missed, against others of their classes that are alike in
             distance and visibility.
         all_objects: The same of all objects of frames that match, against those of the other frames.
@@ -92,6 +94,7 @@ class ScenarioEvaluation:
     name: str
     matching: int
     other: int
+    undecided: int
     roles: tuple[ObjectComparison, ...]
     all_objects: ObjectComparison
     weighted: tuple[Weighted, ...]
@@ -185,8 +188,14 @@ def evaluate(
     rng = np.random.default_rng(seed)
     judge = _Judge(detection, distance_m, least_score, rng, margin, find_clusters(detection.frames, cluster))
     doubts: list[Diagnostic] = []
-    found = [judge.scenario(read_matched(name, _own(name, _records(each, doubts), dataset, doubts), detection.frames,
-                                         detection.objects)) for name, each in named.items()]  # fmt: skip
+    found: list[ScenarioEvaluation] = []
+    for name, each in named.items():
+        records = RecordStream(_records(each, doubts))
+        own = _own(name, records, dataset, doubts)
+        found.append(judge.scenario(
+            read_matched(name, own, detection.frames, detection.objects, lambda records=records: records.completeness)
+        ))  # fmt: skip
+        doubts += _doubt(name, each, records.completeness)
     found = _corrected(found)
     if runs is not None:
         missing_runs = [each.name for each in found if each.name not in runs]
@@ -212,20 +221,34 @@ def _name_of(results: Results) -> str:
     return Path(results).stem if isinstance(results, Path | str) else "results"
 
 
-def _records(results: Results, doubts: list[Diagnostic]) -> Iterator[Record]:
+def _doubt(name: str, results: Results, said: Completeness) -> Iterator[Diagnostic]:
+    """A warning where results do not say of every frame whether it matches."""
+    if said.summary is None and not isinstance(results, Path | str):
+        return  # who hands them over knows
+    told = "other frames count as those that do not match"
+    if said.summary is not None:
+        told = "frames of which it does not say whether they match are left out"
+    hint = f"{told}: `match` without --limit, --sample and --deadline writes complete results"
+    if (doubt := said.doubt(f"{name} (results)", hint)) is not None:
+        yield doubt
+
+
+def _records(results: Results, doubts: list[Diagnostic]) -> Iterator[Record | SummaryRecord]:
     if isinstance(results, Query):
         options = replace(results.options, all_matches=True, proofs=True, every=False, limit=None)
         query = Query(results.dataset, results.source, options, files=results.files)
-        yield from (record(each, every=True) for each in query.results())
+        counted = ResultCount()
+        yield from counted.counted(record(each, every=True) for each in query.results())
         doubts += query.funnel.warnings
+        yield SummaryRecord(summarize(query, counted))
         return
     if isinstance(results, Path | str):
-        yield from read_records(Path(results))
+        yield from read_records(Path(results)).records
         return
     for number, each in enumerate(results, 1):
         if isinstance(each, Result):
             yield record(each)
-        elif isinstance(each, FrameRecord | IntervalRecord):
+        elif isinstance(each, FrameRecord | IntervalRecord | SummaryRecord):
             yield each
         else:
             try:
@@ -357,6 +380,7 @@ class _Judge:
             name=matched.name,
             matching=int(matching.sum()),
             other=int(other.sum()),
+            undecided=int((detection.covered & ~matched.decided).sum()),
             roles=roles,
             all_objects=of_all,
             weighted=tuple(self._weighted(matched.log_weight, [each[:2] for each in asked] or [("all objects", here)])),

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scenicq.errors import DataError, Diagnostic
 from scenicq.evaluate.annotations import Annotations, Frames
 from scenicq.query.execution.records import FrameRecord, IntervalRecord, Record
+from scenicq.query.execution.result_summary import Completeness
 
 __all__ = ["Matched", "Played", "read_matched"]
 
@@ -51,6 +52,7 @@ class Matched:
         log_weight: How much each frame counts where frames are to be spread as the program spreads its scenes, nan
             where the results do not say, shape (frames,); None where they say it of none.
         every: Whether the results say every correspondence of each frame that matches.
+        variables: What the program says at the place of each random variable, as far as the results say it.
     """
 
     name: str
@@ -61,6 +63,7 @@ class Matched:
     witness: Mapping[int, Mapping[str, Any]]
     log_weight: NDArray[np.float64] | None = None
     every: bool = True
+    variables: Mapping[str, str] = field(default_factory=dict[str, str])
 
     @property
     def free(self) -> Bools:
@@ -68,16 +71,22 @@ class Matched:
         return self.matching & self.settled if self.every else np.zeros(len(self.matching), dtype=np.bool_)
 
 
-def read_matched(name: str, records: Iterable[Record], frames: Frames, objects: Annotations) -> Matched:
+def read_matched(
+    name: str, records: Iterable[Record], frames: Frames, objects: Annotations,
+    completeness: Callable[[], Completeness] | None = None,
+) -> Matched:  # fmt: skip
     """Divide the frames of a dataset by the results of a query.
 
-    Frames that the results do not name count as decided: a query names what matches and what is unknown.
+    Frames that the results do not name do not match, where the results are complete: a query names what matches and
+    what is unknown.
 
     Args:
         name: Of the scenario.
         records: Results for frames, or for intervals (whose roles are played by tracks).
         frames: The dataset's.
         objects: Its label objects.
+        completeness: What it means that a frame is not among them, asked once all are taken; that it does not match,
+            where nobody says.
 
     Raises:
         DataError: file-invalid: a result is of a frame or an object that the dataset does not have.
@@ -116,6 +125,11 @@ def read_matched(name: str, records: Iterable[Record], frames: Frames, objects: 
                     played.setdefault(role, {})[here[its]] = None
                 elif of_frame:
                     raise _lacking(name, f"`{its}` in frame {frames.names[frame]}")
+    variables: Mapping[str, str] = {}
+    if completeness is not None:
+        said = completeness()
+        _mark_silent(unknown, frames, said)
+        variables = {} if said.summary is None else said.summary.variables
     return Matched(
         name=name,
         matching=matching,
@@ -125,7 +139,24 @@ def read_matched(name: str, records: Iterable[Record], frames: Frames, objects: 
         witness=witness,
         log_weight=log_weight if ranked else None,
         every=every,
+        variables=variables,
     )
+
+
+def _mark_silent(unknown: Bools, frames: Frames, said: Completeness) -> None:
+    """Mark the frames of which results say nothing; who else may play a role in one that matches is not known, either.
+
+    Args:
+        unknown: Where they are marked.
+        frames: The dataset's.
+        said: What it means that a frame is not named.
+    """
+    if said.whole or said.summary is None:
+        return
+    times_us: list[int] = frames.timestamp_us.tolist()
+    recordings: list[int] = frames.recording.tolist()
+    for number, (frame, recording) in enumerate(zip(frames.names, recordings, strict=True)):
+        unknown[number] |= bool(said.why_silent(frames.recordings[recording], times_us[number], frame))
 
 
 def _log_weight(name: str, told: float | None) -> float:

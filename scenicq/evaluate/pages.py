@@ -11,7 +11,7 @@ import numpy as np
 from scenicq.evaluate.comparison import Share
 from scenicq.evaluate.detection import Detection
 from scenicq.evaluate.evaluation import Evaluation, ScenarioEvaluation, WorstFrame
-from scenicq.evaluate.rows import Table, overview, tables
+from scenicq.evaluate.rows import Table, frame_counts, overview, tables
 from scenicq.geometry.boxes import corners
 from scenicq.geometry.camera import box_corners, box_edges
 from scenicq.report.backdrop import Backdrop
@@ -139,7 +139,7 @@ class _Pages:
         return table(title.capitalize(), [name.lower() for name in head], cells)
 
     def _scenario(self, each: ScenarioEvaluation) -> Iterator[str]:
-        counts = f"{each.matching:,} frames match, {each.other:,} do not"
+        counts = frame_counts(each)
         sentences = [element("p", element("b", escape(role.sentence))) for role in each.headline]
         sentences += [element("p", escape(one.beside), class_="hint") for one in each.headline if one.asked]
         sentences += [element("p", escape(one.sentence)) for one in each.weighted]

@@ -114,7 +114,8 @@ def _figures(each: ClassFigures) -> dict[str, Any]:
 
 def _slice(each: Slice) -> dict[str, Any]:
     others = None if each.other is None else _share(each.other)
-    return {"by": each.by, "part": each.part, "missed": _share(each.share), "others": others}
+    source = {"source": each.source} if each.source else {}
+    return {"by": each.by, **source, "part": each.part, "missed": _share(each.share), "others": others}
 
 
 def evaluation_record(evaluation: Evaluation) -> dict[str, Any]:
@@ -134,6 +135,7 @@ def _scenario(each: ScenarioEvaluation) -> dict[str, Any]:
         "scenario": each.name,
         "matching_frames": each.matching,
         "other_frames": each.other,
+        "undecided_frames": each.undecided,
         "roles": [_comparison(role) for role in each.roles],
         "all_objects": _comparison(each.all_objects),
         "weighted": [_weighted(one) for one in each.weighted],
@@ -215,6 +217,10 @@ def _percent(value: float, interval: tuple[float, float] | None = None) -> str:
     return text
 
 
+_UNITS = {"translation": "m", "scale": "1 - IoU", "orientation": "rad", "velocity": "m/s", "attribute": "share wrong"}
+"""Units of the errors of boxes that were found."""
+
+
 def overview(evaluation: Evaluation) -> Table:
     """What answers the question, of all scenarios in one table."""
     simulated = any(each.simulated is not None for each in evaluation.scenarios)
@@ -231,6 +237,13 @@ def overview(evaluation: Evaluation) -> Table:
     return "scenarios", ("SCENARIO", *_COMPARED, *more), rows
 
 
+def frame_counts(scenario: ScenarioEvaluation) -> str:
+    """How many frames match, do not, and are undecided, in words."""
+    told = f"{scenario.matching:,} frames match, {scenario.other:,} do not"
+    undecided = scenario.undecided
+    return f"{told}, {undecided:,} {'is' if undecided == 1 else 'are'} undecided" if undecided else told
+
+
 def tables(scenario: ScenarioEvaluation, distance_m: float) -> list[Table]:
     """What people look at: roles, classes at one centre distance, slices."""
     found: list[Table] = [
@@ -243,7 +256,15 @@ def tables(scenario: ScenarioEvaluation, distance_m: float) -> list[Table]:
     classes = [each for each in scenario.classes if each.distance_m == distance_m]
     errors = {(each.category, each.group): each.errors for each in scenario.classes if each.errors}
     told = [name for name in ERRORS if any(name in each for each in errors.values())]
-    heads = ("CLASS", "FRAMES", "OBJECTS", "RECALL", "PRECISION", "AP", *(name.upper() for name in told))
+    heads = (
+        "CLASS",
+        "FRAMES",
+        "OBJECTS",
+        "RECALL",
+        "PRECISION",
+        "AP",
+        *(f"{name.upper()} ({_UNITS[name]})" for name in told),
+    )
     rows = [
         (
             each.category,
@@ -259,7 +280,7 @@ def tables(scenario: ScenarioEvaluation, distance_m: float) -> list[Table]:
     found.append((f"classes, found within {distance_m:g} m, errors within 2 m", heads, rows))
     cut = [
         (
-            each.by,
+            each.title,
             each.part,
             f"{each.share.of:g}",
             f"{each.share.recordings:.1f}",
@@ -286,7 +307,8 @@ def _compared(each: ObjectComparison) -> tuple[str, ...]:
         _percent(each.other.rate, each.other.interval),
         shown(each.p_value),
         shown(each.p_corrected),
-        f"{each.recordings}" + (f" (as {each.effective:.1f})" if each.effective < each.recordings - 0.05 else ""),
+        f"{each.recordings}"
+        + (f" (as {each.effective:.1f} equal ones)" if each.effective < each.recordings - 0.05 else ""),
         each.says,
     )
 

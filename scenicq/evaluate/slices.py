@@ -24,6 +24,8 @@ _Pair = Sequence[Any]
 
 _PARTS = 5
 """Into how many parts of like size numbers are cut."""
+_LONGEST = 40
+"""Characters of source text that are shown."""
 _NAMES = 12
 """More distinct texts than this are no slices."""
 
@@ -37,12 +39,24 @@ class Slice:
         part: Which part.
         share: Of the part's objects that were missed.
         other: The same among the other objects; None where that makes no sense.
+        source: Of a random variable what the program says at its place, which is `by`; "" of anything else.
     """
 
     by: str
     part: str
     share: Share
     other: Share | None
+    source: str = ""
+
+    @property
+    def title(self) -> str:
+        """What divides them, for people: the source text of a random variable, with line and column."""
+        place = _place(self.by)
+        coordinate = self.by.removeprefix(place).strip()
+        if not self.source:
+            return self.by
+        text = self.source if len(self.source) <= _LONGEST else f"{self.source[: _LONGEST - 3]}..."
+        return f"{f'{coordinate} of ' if coordinate else ''}{text} ({':'.join(place.split(':')[-2:])})"
 
 
 def slices(
@@ -59,6 +73,7 @@ def slices(
         cluster: Number of each object's cluster.
     """
     parts = list(_parts_of(detection, matched, mine))
+    places = {by for by, _, _, others_too in parts if not others_too}
     level = 1 - (1 - LEVEL) / max(len(parts), 1)
     return tuple(
         Slice(
@@ -66,6 +81,7 @@ def slices(
             name,
             share_of(missed, mine & of, cluster, level),
             share_of(missed, others & of, cluster, level) if others_too else None,
+            matched.variables.get(_place(by).partition("#")[0], "") if by in places else "",
         )
         for by, name, of, others_too in parts
     )
@@ -106,6 +122,11 @@ def _parts_of(detection: Detection, matched: Matched, mine: Bools) -> Iterator[t
                 drawn[frame] = take(matched.witness.get(frame, {}).get(key))
             names, part = _parts(drawn, in_question)
             yield from told(f"{key}{suffix}", names, part[objects.frame], others_too=False)
+
+
+def _place(by: str) -> str:
+    """The place of a random variable, of which a coordinate may divide."""
+    return by[:-2] if by.endswith((" x", " y")) else by
 
 
 def _is_pair(value: Any) -> bool:

@@ -25,6 +25,7 @@ from scenicq.exporters.interchange import write_interchange
 from scenicq.exporters.openlabel import write_openlabel
 from scenicq.match.verdict import Match, Unknown
 from scenicq.query.execution.interval_frames import frames_of
+from scenicq.query.execution.result_summary import ResultSummary
 from scenicq.query.execution.results import Result
 from scenicq.store.atomic_files import whole_folder
 from scenicq.store.dataset import Dataset
@@ -105,8 +106,11 @@ class Exporter:
             )
         self._unknown += isinstance(result.verdict, Unknown)
 
-    def finish(self) -> ExportSummary:
+    def finish(self, summary: ResultSummary | None = None) -> ExportSummary:
         """Write the folder.
+
+        Args:
+            summary: What the results say of themselves, where somebody knows it.
 
         Raises:
             DataError: `target-unwritable`.
@@ -128,6 +132,9 @@ class Exporter:
             for count, what in told
             if count
         ]
+        if summary is not None and not summary.complete:
+            message = f"the export is not complete: {summary.why_cut}"
+            problems.append(Diagnostic("results-incomplete", message, severity="warning"))
         return ExportSummary(self.target, tuple(files), len(self._matched), tuple(problems))
 
     @property

@@ -22,17 +22,22 @@ from scenicq.match.matcher import Matcher
 from scenicq.match.verdict import NoMatch
 from scenicq.notebook.judgements import Judgement
 from scenicq.notebook.pictures import SCROLLS, DisplayedText, Picture, take_picture
+from scenicq.query.execution.interval_frames import verdict_at
 from scenicq.query.execution.lazy_solver import LazySolver
 from scenicq.query.execution.records import json_text, record
 from scenicq.query.execution.result_origin import name_origin
-from scenicq.query.execution.result_tables import result_schema, result_table
+from scenicq.query.execution.result_summary import ResultCount, ResultSummary
+from scenicq.query.execution.result_tables import result_schema, result_table, summary_metadata
 from scenicq.query.execution.results import Funnel, Result
 from scenicq.query.execution.run import Query
+from scenicq.query.execution.skipped_frames import summarize
 from scenicq.query.explain.frame_explanation import explain, show_explanation
-from scenicq.query.explain.interval_explanation import explain_recording
+from scenicq.query.explain.interval_explanation import explain_beginning, explain_recording
+from scenicq.query.explain.moments import intervals_around, named_frame, named_moment
 from scenicq.report.backdrop import Backdrop
 from scenicq.report.picture import LETTERS, Shot, draw
 from scenicq.report.write import write_report
+from scenicq.store.labels import Label
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -41,6 +46,10 @@ __all__ = ["FrameResult", "Matches"]
 
 _ROWS, _PICTURES = 20, 3
 """Results that a notebook shows at most: as rows, and as pictures."""
+_FAILURES = 5
+"""What frames fail at that a notebook names at most, where nothing is found."""
+_HEAD = ("frame", "recording", "verdict", "objects")
+_INTERVAL_HEAD = ("recording", "start_us", "seconds", "frames", "verdict", "objects")
 _SMALL = 260
 """Width in pixels of a picture beside others."""
 _LETTERS = 2 * LETTERS
@@ -123,8 +132,10 @@ class FrameResult(_Origin):
             return DisplayedText(explain_recording(query, solver, self.recording, self.timestamp_us).text())
 
     def show(self, *, half: float | None = None, width: int = 600) -> Picture:
-        """The frame from above, with what the program says of it."""
-        return self.matches.show(self.frame, half=half, width=width)
+        """The frame from above, with what the program says of it; of an interval its first."""
+        if self.result.interval is None:
+            return self.matches.show(self.frame, half=half, width=width)
+        return take_picture(*self.matches.shot_of(self.result), half, width)
 
     def _repr_svg_(self) -> str:
         return self.show().svg
@@ -222,6 +233,14 @@ class Matches(Sequence[FrameResult]):
         return self.query.funnel
 
     @property
+    def summary(self) -> ResultSummary:
+        """What the results say of themselves: whether all frames were looked at, and how many are undecided."""
+        every, counted = self.query.options.all_matches, ResultCount()
+        for each in self._all():
+            counted.add(record(each.result, every=every))
+        return summarize(self.query, counted)
+
+    @property
     def warnings(self) -> tuple[DisplayedText, ...]:
         """What the author of the program should know: what cannot be meant, and what no label has to compare."""
         return tuple(DisplayedText(render(each)) for each in (*self.funnel.warnings, *lint_query(self.query)))
@@ -230,42 +249,65 @@ class Matches(Sequence[FrameResult]):
         """The results as an Arrow table with a field a role, as `-o FILE.parquet` has it."""
         every = self.query.options.all_matches
         schema = result_schema(self.query.roles(), origin=self.origin, over_time=self.query.is_over_time(), every=every)
+        schema = schema.with_metadata({**(schema.metadata or {}), **summary_metadata(self.summary)})
         return result_table((record(each.result, every=every) for each in self._all()), schema)
 
     def to_pandas(self) -> Any:
         """The results as a data frame; pandas is to be installed."""
         return self.to_arrow().to_pandas()
 
+    def shot_of(self, result: Result) -> tuple[Shot, Backdrop]:
+        """What a picture of a result shows: of an interval its first frame, with whoever plays the roles there."""
+        if result.interval is None:
+            return self._shot(result.frame)
+        return self._shot_in(self.query.dataset.label(result.frame), result)
+
+    def _shot_in(self, label: Label, interval: Result) -> tuple[Shot, Backdrop]:
+        """A frame of an interval, with whoever plays the roles there."""
+        scenario = self.query.compiled_map(label.map).scenario
+        return Shot(label, scenario, verdict_at(label, interval)), self._backdrop(label)
+
+    def _backdrop(self, label: Label) -> Backdrop:
+        if label.map not in self._backdrops:
+            self._backdrops[label.map] = Backdrop(self.query.dataset.network(label.map))
+        return self._backdrops[label.map]
+
     def _shot(self, frame: str) -> tuple[Shot, Backdrop]:
-        label = self.query.dataset.label(frame)
+        label = named_frame(self.query.dataset, frame)
+        if self.query.is_over_time() and (around := intervals_around(self.query, label)):
+            return self._shot_in(label, around[0])
         world = self.query.compiled_map(label.map)
         with LazySolver(self.query.options.solver) as solver:
             matcher = Matcher(world.scenario, self.query.options.match, solver)
             verdict = matcher.match(label)
             why = explain(matcher, label) if isinstance(verdict, NoMatch) else None
-        if label.map not in self._backdrops:
-            self._backdrops[label.map] = Backdrop(self.query.dataset.network(label.map))
-        return Shot(label, world.scenario, verdict, why), self._backdrops[label.map]
+        return Shot(label, world.scenario, verdict, why), self._backdrop(label)
 
     def explain(self, frame: str) -> DisplayedText:
-        """Why a frame matches, or what keeps it from it and which tolerance would do.
+        """Why a frame or a recording matches, or what keeps it from it and what would do.
 
         Args:
-            frame: Its name; any frame of the dataset.
+            frame: The name of any frame of the dataset; over time also of a recording, and after `@` when the interval
+                begins, as a timestamp or in seconds, such as `scene-0061@3.5s`.
 
         Raises:
             DataError: option-invalid: there is no such frame.
         """
-        label = self.query.dataset.label(frame)
+        dataset, over_time = self.query.dataset, self.query.is_over_time()
         with LazySolver(self.query.options.solver) as solver:
+            if over_time and (moment := named_moment(dataset, frame)) is not None:
+                return DisplayedText(explain_recording(self.query, solver, *moment).text())
+            label = named_frame(dataset, frame)
+            if over_time:
+                return DisplayedText(explain_beginning(self.query, solver, label)[1])
             matcher = Matcher(self.query.compiled_map(label.map).scenario, self.query.options.match, solver)
             return DisplayedText(show_explanation(explain(matcher, label)))
 
     def show(self, frame: str, *, half: float | None = None, width: int = 600) -> Picture:
-        """A frame from above, with what the program says of it.
+        """A frame from above, with what the program says of it; over time with the roles of the interval around it.
 
         Args:
-            frame: Its name; any frame of the dataset.
+            frame: The name of any frame of the dataset, or of a recording and after `@` a timestamp, or seconds.
             half: Metres from the ego to the edges, 1 to 1,000; chosen if None.
             width: In pixels, 50 to 10,000.
 
@@ -328,25 +370,61 @@ class Matches(Sequence[FrameResult]):
     def __repr__(self) -> str:
         """What was asked and, once known, how many results there are."""
         known = f"{len(self._found)} results" if self._rest is not None else "not yet looked for"
+        if self.query.funnel.limited is not None:
+            known += f", not complete: {self.summary.why_cut}"
         return f"<{self.query.source.name} on {self.query.dataset.name}: {known}>"
 
     def _repr_html_(self) -> str:
         funnel = self.funnel
         pictures = "".join(f'<div style="{_TILE}">{self._tile(each)}</div>' for each in self._found[:_PICTURES])
-        head = "".join(f"<th>{name}</th>" for name in ("frame", "recording", "verdict", "objects"))
+        over_time = self.query.is_over_time()
+        head = "".join(f"<th>{name}</th>" for name in (_INTERVAL_HEAD if over_time else _HEAD))
         rows = "".join(f"<tr>{_cells(each)}</tr>" for each in self._found[:_ROWS])
         more = f"<p>and {len(self._found) - _ROWS} more</p>" if len(self._found) > _ROWS else ""
         told = f"{funnel.matches} of {funnel.frames} frames match, {funnel.unknowns} unknown"
+        if over_time:
+            what = "interval matches" if funnel.matches == 1 else "intervals match"
+            of = f"{funnel.frames:,} frames of {funnel.over_time['recordings']:,} recordings"
+            told = f"{funnel.matches:,} {what}, {funnel.unknowns:,} unknown, in {of}"
+        told += f"; not complete: {cut}" if (cut := self.summary.why_cut) else ""
         notes = "".join(f'<pre style="{SCROLLS}">{escape(text)}</pre>' for text in self.warnings)
         table = f'<div style="{SCROLLS}"><table><tr>{head}</tr>{rows}</table></div>'
+        if not self._found:
+            table = self._failures(over_time=over_time)
         return f"<p>{told}</p>{notes}<div>{pictures}</div>{table}{more}"
+
+    def _failures(self, *, over_time: bool) -> str:
+        """What most failed at, where nothing is found."""
+        funnel = self.funnel
+        parts: list[str] = []
+        asked = (("first failed at", "frames", funnel.excluded), ("then failed at", "intervals", funnel.broken))
+        for head, of, counts in asked:
+            rows = "".join(
+                f"<tr><td>{escape(what)}</td><td>{count:,}</td></tr>" for what, count in counts.most_common(_FAILURES)
+            )
+            if rows:
+                parts.append(f"<table><tr><th>{head}</th><th>{of}</th></tr>{rows}</table>")
+        named = '"RECORDING"' if over_time else '"FRAME"'
+        hint = f"<p><code>matches.explain({named})</code> says what keeps one from matching, and what would do.</p>"
+        return "".join([*parts, hint])
 
     def _tile(self, each: FrameResult) -> str:
         """A small picture, with its frame in letters of the notebook's size below."""
-        shot, backdrop = self._shot(each.frame)
+        shot, backdrop = self.shot_of(each.result)
         return f"{draw(shot, backdrop, pixels=_SMALL, captioned=False, letters=_LETTERS)}<br>{escape(each.frame)}"
 
 
 def _cells(each: FrameResult) -> str:
     objects = ", ".join(f"{role}={played}" for role, played in each.roles.items() if (role, played) != ("ego", "ego"))
-    return "".join(f"<td>{escape(text)}</td>" for text in (each.frame, each.recording, each.verdict, objects))
+    cells = (each.frame, each.recording, each.verdict, objects)
+    if each.result.interval is not None:
+        seconds = f"{(each.end_us - each.timestamp_us) / 1e6:.1f}"
+        cells = (
+            each.recording,
+            f"{each.timestamp_us}",
+            seconds,
+            f"{each.frames} from {each.frame}",
+            each.verdict,
+            objects,
+        )
+    return "".join(f"<td>{escape(text)}</td>" for text in cells)

@@ -10,21 +10,25 @@ from typing import Literal
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.query.execution.records import CauseRecord, FrameRecord, IntervalRecord, Record
+from scenicq.query.execution.result_files import ReadResults
 from scenicq.query.execution.result_origin import check_origins
 from scenicq.report.frames import table
 from scenicq.report.page import page
 from scenicq.report.svg import element, escape
 
-__all__ = ["FrameChange", "changes", "changes_page", "changes_text", "check_datasets"]
+__all__ = ["FrameChange", "changes", "changes_page", "changes_text", "check_complete", "check_datasets"]
 
-Kind = Literal["came", "went", "recast", "stayed"]
+Kind = Literal["came", "went", "undecided", "recast", "stayed"]
 _TOLD: dict[Kind, str] = {
     "came": "match in B only",
     "went": "match in A only",
+    "undecided": "match in one, and nobody knows whether in the other",
     "recast": "match in both, with other objects or another end",
     "stayed": "match in both, with the same objects",
 }
-_MARKS: dict[Kind, str] = {"came": "+", "went": "-", "recast": "~", "stayed": "="}
+_MARKS: dict[Kind, str] = {"came": "+", "went": "-", "undecided": "?", "recast": "~", "stayed": "="}
+_FOUND: tuple[Kind, ...] = ("undecided",)
+"""What is told where there is any."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,8 +39,8 @@ class FrameChange:
         kind: What became of it.
         frame, recording: Which frame; an interval is called by its recording and where it starts.
         before, after: Label object of each role in A and in B, where it matches there.
-        why: What the file in which it does not match says of it, if anything; of an interval that matches in both
-            where it ends, if that differs.
+        why: What the file in which it does not match, or is undecided, says of it, if anything; of an interval that
+            matches in both where it ends, if that differs.
     """
 
     kind: Kind
@@ -69,26 +73,60 @@ def _moved(old: Record | None, new: Record | None) -> str:
     return ""
 
 
-def changes(before: Mapping[str, Record], after: Mapping[str, Record]) -> list[FrameChange]:
+def _silence(record: Record, results: ReadResults) -> str:
+    """Why results do not name what others do; "" where it does not match."""
+    first = record.frame if isinstance(record, FrameRecord) else record.frames.first
+    return results.completeness.why_silent(record.recording, _start_us(record), first)
+
+
+def changes(before: ReadResults, after: ReadResults) -> list[FrameChange]:
     """What became of each frame or interval that matches in either, by recording, then time.
 
     Args:
-        before: Records of the first file by frame, or by recording and start.
-        after: Records of the second.
+        before: The results of the first file.
+        after: Those of the second.
     """
     found: list[tuple[tuple[str, int, str], FrameChange]] = []
-    for frame in before.keys() | after.keys():
-        old, new = before.get(frame), after.get(frame)
+    for frame in before.records.keys() | after.records.keys():
+        old, new = before.records.get(frame), after.records.get(frame)
         was, is_ = _played(old), _played(new)
         shown = new if is_ is not None else old if was is not None else None
         if shown is None:
             continue
-        why = _why(old if was is None else new if is_ is None else None) or _moved(old, new)
-        same = was == is_ and not why
-        kind: Kind = "came" if was is None else "went" if is_ is None else "stayed" if same else "recast"
+        kind: Kind
+        if was is not None and is_ is not None:
+            why = _moved(old, new)
+            kind = "stayed" if was == is_ and not why else "recast"
+        else:
+            silent, quiet = (old, before) if was is None else (new, after)
+            why = _why(silent) if silent is not None else _silence(shown, quiet)
+            open_ = bool(why) if silent is None else silent.verdict == "unknown"
+            kind = "undecided" if open_ else "came" if was is None else "went"
         change = FrameChange(kind, frame, shown.recording, was or {}, is_ or {}, why)
         found.append(((shown.recording, _start_us(shown), frame), change))
     return [change for _, change in sorted(found, key=lambda each: each[0])]
+
+
+def check_complete(found: Sequence[FrameChange], before: ReadResults, after: ReadResults) -> list[Diagnostic]:
+    """Warnings of results that are not complete, or may not be where something hangs on it.
+
+    Args:
+        found: As `changes` gives them.
+        before: The results of the first file.
+        after: Those of the second.
+    """
+    told: list[Diagnostic] = []
+    sides: tuple[tuple[str, Kind, ReadResults], ...] = (("A", "came", before), ("B", "went", after))
+    for side, kind, results in sides:
+        hint = f"frames of which {side} does not say whether they match are undecided"
+        if results.completeness.summary is None:
+            counted = sum(each.kind == kind and not each.why for each in found)
+            hint = f"{counted:,} of those that match in the other alone are not named in it: they may match, too"
+            if not counted or not results.records:
+                continue
+        doubt = results.completeness.doubt(side, hint)
+        told += [] if doubt is None else [doubt]
+    return told
 
 
 def check_datasets(before: Mapping[str, Record], after: Mapping[str, Record]) -> Diagnostic | None:
@@ -139,11 +177,13 @@ def _objects(change: FrameChange) -> str:
 
 def _elsewhere(change: FrameChange) -> str:
     """What the file in which the frame does not match says of it, or B of an interval that matches in both."""
-    return change.why and f"in {'A' if change.kind == 'came' else 'B'} {change.why}"
+    missing_in_a = change.kind == "came" or (change.kind == "undecided" and not change.before)
+    return change.why and f"in {'A' if missing_in_a else 'B'} {change.why}"
 
 
 def _counts(found: Sequence[FrameChange]) -> list[tuple[Kind, int]]:
-    return [(kind, sum(change.kind == kind for change in found)) for kind in _TOLD]
+    counts: list[tuple[Kind, int]] = [(kind, sum(change.kind == kind for change in found)) for kind in _TOLD]
+    return [(kind, count) for kind, count in counts if count or kind not in _FOUND]
 
 
 def changes_text(found: Sequence[FrameChange], *, every: bool = False) -> str:
@@ -180,16 +220,19 @@ def _section(kind: Kind, found: Sequence[FrameChange]) -> str:
     return element("details", title, reasons, element("ul", *items), open=kind != "stayed", class_="change")
 
 
-def changes_page(found: Sequence[FrameChange], names: tuple[str, str]) -> str:
+def changes_page(found: Sequence[FrameChange], names: tuple[str, str], doubts: Sequence[Diagnostic] = ()) -> str:
     """The changes as a page that needs nothing but itself.
 
     Args:
         found: As `changes` gives them.
         names: What the two files are called.
+        doubts: What the reader should know of them.
     """
     counts = [(f"{_MARKS[kind]}\N{NO-BREAK SPACE}{kind}", _TOLD[kind], f"{count:,}") for kind, count in _counts(found)]
     files = [element("p", element("b", side), ": ", escape(name)) for side, name in zip("AB", names, strict=True)]
-    parts = [table("Frames", ("change", "meaning", "frames"), counts)]
+    told = [element("li", escape("; ".join((each.message, *each.hints)))) for each in doubts]
+    parts = [element("ul", *told, class_="cause")] if told else []
+    parts += [table("Frames", ("change", "meaning", "frames"), counts)]
     for kind in _TOLD:
         group = [change for change in found if change.kind == kind]
         parts += [_section(kind, group)] if group else []

@@ -8,10 +8,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime, timedelta
 
 from scenicq.errors import Source
-from scenicq.forest.scenario import Scenario
-from scenicq.forest.walk import leaves
 from scenicq.geometry.angles import normalize, rotate
 from scenicq.match.verdict import Match, NoMatch, Unknown, Verdict
+from scenicq.query.execution.variable_texts import variable_texts
 from scenicq.report.camera_pictures import SpaceBox, camera_image, space_box
 from scenicq.report.legend import legend
 from scenicq.report.page import page
@@ -19,7 +18,7 @@ from scenicq.report.picture import Shot
 from scenicq.report.sensors import Sensor
 from scenicq.report.svg import element, escape
 
-__all__ = ["badge", "frame_facts", "frame_page", "table", "variable_texts", "when"]
+__all__ = ["badge", "frame_facts", "frame_page", "table", "when"]
 
 _FIRST_US, _LAST_US = 946_684_800_000_000, 4_102_444_800_000_000
 """Start of the years 2000 and 2100: what lies outside is no date."""
@@ -78,18 +77,6 @@ def _roles(shot: Shot) -> str:
 def _value(value: float | tuple[float, float]) -> str:
     shown = f"({value[0]:z.2f}, {value[1]:z.2f})" if isinstance(value, tuple) else f"{value:z.5g}"
     return element("span", escape(shown), class_="where")
-
-
-def variable_texts(scenario: Scenario) -> dict[str, str]:
-    """What the program says at the place of each random variable.
-
-    Args:
-        scenario: The scenario.
-    """
-    roots = [requirement.condition for requirement in scenario.requirements]
-    roots += [given.value for given in scenario.params.values()]
-    roots += [given.value for owner in scenario.objects for given in owner.properties.values()]
-    return {leaf.span.mark: " ".join(leaf.span.text.split()) for leaf in leaves(*roots) if leaf.span is not None}
 
 
 def _witness(verdict: Match, source: Source, texts: Mapping[str, str]) -> str:

@@ -80,12 +80,12 @@ def _step(name: str, number: int, frames: int | None = None) -> str:
     )
 
 
-def funnel_section(funnel: Funnel, total: int) -> str:
+def funnel_section(funnel: Funnel, cut: str) -> str:
     """How many frames are left after each step.
 
     Args:
         funnel: Of a query whose results were taken.
-        total: Frames of the dataset.
+        cut: What the results leave out; "" where they are complete.
     """
     recordings = funnel.over_time["recordings"]
     of = f" of {recordings:,} recording{'' if recordings == 1 else 's'}" if funnel.over_time else ""
@@ -104,7 +104,6 @@ def funnel_section(funnel: Funnel, total: int) -> str:
         steps += [("matches", funnel.matches), ("unknown", funnel.unknowns)]
     rows = [_step(name, number, funnel.frames) for name, number in steps]
     rows += [_step(name, number) for name, number in counted]
-    stopped = f"Stopped after {funnel.frames:,} of {total:,} frames (--limit)." if funnel.frames < total else ""
     told = [
         "; ".join((f"{each.message}{f' ({each.span.place})' if each.span is not None else ''}", *each.hints))
         for each in funnel.warnings
@@ -125,7 +124,7 @@ def funnel_section(funnel: Funnel, total: int) -> str:
     return element(
         "section",
         element("h2", "Where the frames went", id="funnel-title"),
-        element("p", escape(stopped), class_="hint") if stopped else "",
+        element("p", escape(f"Not complete: {cut}."), class_="hint") if cut else "",
         element("ul", *warnings, class_="cause") if warnings else "",
         element("table", element("tbody", *rows), class_="funnel"),
         table("First failed at", ("what", "frames", "share"), failed),

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from scenicq.match.verdict import Match, NoMatch, Unknown, Verdict
-from scenicq.query.execution.interval_frames import frames_of
+from scenicq.query.execution.interval_frames import frames_of, verdict_at
 from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query
 from scenicq.query.explain.bands import Band, bands_of
@@ -28,22 +27,11 @@ def interval_runs(query: Query, results: Iterable[Result], numbers: dict[str, tu
     """
     for result in results:
         frames = tuple(
-            Result(label.frame, label.recording, label.timestamp_us, _at(result.verdict, roles), label.sensors)
-            for label, roles in frames_of(query.dataset, result)
+            Result(label.frame, label.recording, label.timestamp_us, verdict_at(label, result), label.sensors)
+            for label, _ in frames_of(query.dataset, result)
         )
         number, count = numbers[result.frame]
         yield FrameRun(result.recording, frames, number, count, _timeline(query, result))
-
-
-def _at(verdict: Verdict, roles: dict[str, str]) -> Verdict:
-    """The verdict on an interval with the label objects of one of its frames."""
-    match verdict:
-        case Match():
-            return Match(roles, verdict.witness)
-        case Unknown():
-            return Unknown(verdict.reason, verdict.cause, roles)
-        case NoMatch():
-            return NoMatch(verdict.cause, roles)
 
 
 def _timeline(query: Query, result: Result) -> str:

@@ -14,12 +14,14 @@ from scenicq.forest.scenario import Scenario
 from scenicq.match.matcher import Matcher
 from scenicq.match.verdict import Match, NoMatch, Unknown
 from scenicq.query.execution.lazy_solver import LazySolver
+from scenicq.query.execution.result_summary import ResultCount
 from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query
+from scenicq.query.execution.skipped_frames import summarize
+from scenicq.query.execution.variable_texts import variable_texts
 from scenicq.query.explain.frame_explanation import explain, explain_match
 from scenicq.report.backdrop import Backdrop
 from scenicq.report.cards import TILE_LETTERS, Card, best_frame, draw_card, draw_tile
-from scenicq.report.frames import variable_texts
 from scenicq.report.overview import funnel_section, how_section, program_section
 from scenicq.report.page import GENERATOR, page, runs_section
 from scenicq.report.picture import LETTERS, Shot, draw
@@ -234,7 +236,7 @@ class _Report:
         overview = element(
             "div",
             program_section(lines, rest, funnel.frames),
-            funnel_section(funnel, dataset.manifest.total.frames),
+            funnel_section(funnel, summarize(self.query, ResultCount()).why_cut),
             class_="overview",
         )
         main = element(

@@ -275,11 +275,12 @@ class TrackBlock:
             codes, names = self._names()
             recordings = self.recording_of[self.label_of[: self.object_count]]
             known = recordings * len(names) + codes
-            # a label object without a track is one of its own; so is the ego of a recording
+            # a label object without a track is one of its own, as is one of a recording that is not among these, such
+            # as of another map; so is the ego of a recording
             alone = np.arange(self.object_count) + len(self.runs) * (len(names) + 1)
-            objects = np.where(codes < len(names), known, alone)
+            objects = np.where((codes < len(names)) & (recordings >= 0), known, alone)
             # so is what a label without an ego has in its place, which is a mere point to look from
-            there = self.present_ego(np.arange(len(self))) >= 0
+            there = (self.present_ego(np.arange(len(self))) >= 0) & (self.recording_of >= 0)
             nobody = int(alone[-1] + 1 if self.object_count else len(self.runs) * (len(names) + 1)) + np.arange(
                 len(there)
             )

@@ -161,3 +161,27 @@ def test_from_python(parked):
     source, folder = parked
     matches = scenicq.open(folder / "street").match(source / "parked_car.scenic")
     assert "missed" in str(matches.evaluate(source / "predictions.jsonl", simulated=source / "runs.csv"))
+
+
+def test_the_table_has_units_and_says_what_the_program_says(run, judge, parked, tmp_path):
+    table = judge().stdout
+    assert "TRANSLATION (m)" in table
+    assert "SCALE (1 - IoU)" in table
+    assert "ORIENTATION (rad)" in table
+    assert "  Range(4, 20) (6:7)  " in table
+    assert "parked_car.scenic:6:7" not in table
+    (one,) = json.loads(judge("--format", "json").stdout)["scenarios"]
+    sources = {each["by"]: each.get("source") for each in one["slices"]}
+    assert (sources["parked_car.scenic:6:7"], sources["distance"]) == ("Range(4, 20)", None)
+    # a file whose name has spaces, the program in place of results, and points
+    program = tmp_path / "a b x.scenic"
+    anywhere = "in everywhere, facing Range(0, 360) deg"
+    text = (
+        "model scenic.domains.driving.model\nego = new Car {0}\nother = new Car {0}\nrequire (distance to other) < 20\n"
+    )
+    program.write_text(text.format(anywhere))
+    source, folder = parked
+    done = run("evaluate", program, folder / "street", "--predictions", source / "predictions.jsonl")
+    assert done.exit_code == 0, done.output
+    assert "x of in everywhere (2:15)" in done.stdout
+    assert "Range(0, 360) (2:37)" in done.stdout

@@ -36,6 +36,10 @@ def test_in_a_pipe_results_are_json_lines_and_stderr_is_empty(installed, crossro
     records = [json.loads(line) for line in done.stdout.splitlines()]
     assert (done.returncode, done.stderr) == (0, "")
     assert [record["frame"] for record in records] == FRAMES
+    summary = records[-1].pop("summary")
+    texts = summary.pop("variables").values()
+    assert summary == {"complete": True, "results": 5, "frames": 156}
+    assert all(each in crossing.read_text() for each in texts)
     assert all(list(record) == KEYS for record in records)
     assert records[0]["correspondence"] == {"ego": "ego", "leftward": "car-left-1", "rightward": "car-right-1"}
     assert list(tmp_path.iterdir()) == []
@@ -127,6 +131,7 @@ def test_a_file_s_extension_says_its_format(run, crossroads, crossing, tmp_path)
     lines = [json.loads(line) for line in (tmp_path / "a.jsonl").read_text().splitlines()]
     assert table.column("correspondence").to_pylist() == [line["correspondence"] for line in lines]
     (origin,) = {line.pop("dataset") for line in lines}
+    assert json.loads(pq.read_metadata(tmp_path / "a.parquet").metadata[b"scenicq.summary"]) == lines[-1].pop("summary")
     assert table.schema.metadata[b"scenicq.dataset"].decode() == origin
     assert [json.loads(json_text(read_row(row))) for row in table.to_pylist()] == lines
     cells = csv.DictReader(io.StringIO((tmp_path / "a.csv").read_text()))

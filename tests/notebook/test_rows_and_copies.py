@@ -6,10 +6,12 @@ import json
 import os
 import pickle
 
+import msgspec
 import pytest
 
 import scenicq
 from scenicq.query.execution.records import json_text
+from scenicq.query.execution.result_summary import ResultSummary
 from scenicq.query.execution.result_tables import read_row
 from scenicq.store.read_lock import Reading, nobody_reads
 
@@ -98,6 +100,7 @@ def test_intervals_are_rows_and_tables_too(crossroads, run, scenarios):
     program = scenarios.parent / "over_time" / "02_cut_in.scenic"
     found = scenicq.open(crossroads).match(program)
     lines = [json.loads(line) for line in run("match", program, crossroads, "--format", "jsonl").stdout.splitlines()]
+    assert msgspec.convert(lines[-1].pop("summary"), ResultSummary) == found.summary
     assert [each.record for each in found] == lines
     assert [(each.frame, each.timestamp_us, each.end_us, each.frames) for each in found] == [
         (line["frames"]["first"], line["start_us"], line["end_us"], line["frames"]["count"]) for line in lines

@@ -80,13 +80,14 @@ def test_every_format_of_match_is_read(run, crossroads, scenarios, tmp_path, kin
     for name in ("lines.jsonl", f"cells.{kind}"):
         assert run("match", scenario, crossroads, "--all", "-o", tmp_path / name).exit_code == 0
     lines, cells = read_results(tmp_path / "lines.jsonl"), read_results(tmp_path / f"cells.{kind}")
+    found = changes(lines, cells)
+    assert {each.kind for each in found} == {"stayed"}
+    assert [each.frame for each in found] == [each.frame for each in changes(lines, lines)]
+    lines, cells = lines.records, cells.records
     assert lines.keys() == cells.keys()
     for frame, record in lines.items():
         for key in ("recording", "timestamp_us", "verdict", "correspondence"):
             assert getattr(cells[frame], key) == getattr(record, key)
-    found = changes(lines, cells)
-    assert {each.kind for each in found} == {"stayed"}
-    assert [each.frame for each in found] == [each.frame for each in changes(lines, lines)]
 
 
 @pytest.mark.parametrize(
@@ -149,7 +150,7 @@ def test_every_format_names_its_dataset(run, crossroads, scenarios, tmp_path, ki
     file = tmp_path / f"a.{kind}"
     assert run("match", scenarios / "02_crossing_cars.scenic", crossroads, "-o", file).exit_code == 0
     other = tmp_path / "b.jsonl"
-    frame = next(iter(read_results(file).values()))
+    frame = next(iter(read_results(file).records.values()))
     other.write_text(json_text(structs.replace(frame, dataset="elsewhere@00000000")) + "\n")
     done = run("report", file, other)
     assert (done.exit_code, done.stdout) == (2, "")

@@ -18,7 +18,7 @@ def rows(markup):
 
 def test_of_frames_it_counts_frames():
     funnel = Funnel(frames=40, candidates=20, with_roles=10, matches=4, unknowns=1)
-    assert rows(funnel_section(funnel, 40)) == [
+    assert rows(funnel_section(funnel, "")) == [
         ("frames", "40", True),
         ("after the prefilter", "20", True),
         ("with an object for every role", "10", True),
@@ -31,7 +31,7 @@ def test_over_time_it_counts_what_intervals_come_from():
     counted = Counter({"starts": 9, "recordings": 2, "bindings": 5, "cut off": 3})
     broken = Counter({"require always ego.speed < 9": 2})
     funnel = Funnel(frames=40, candidates=20, matches=1, over_time=counted, broken=broken)
-    markup = funnel_section(funnel, 40)
+    markup = funnel_section(funnel, "")
     assert rows(markup) == [
         ("frames of 2 recordings", "40", True),
         ("after the prefilter", "20", True),

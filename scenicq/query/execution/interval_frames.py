@@ -6,13 +6,13 @@ from collections.abc import Iterator
 from contextlib import closing
 
 from scenicq.errors import DataError, Diagnostic
-from scenicq.match.verdict import NoMatch
+from scenicq.match.verdict import Match, NoMatch, Unknown, Verdict
 from scenicq.query.execution.results import Result
 from scenicq.store.dataset import Dataset
 from scenicq.store.labels import Label
 from scenicq.store.sql import sql_text
 
-__all__ = ["frames_of", "locate", "roles_in"]
+__all__ = ["frames_of", "locate", "roles_in", "verdict_at"]
 
 
 def locate(dataset: Dataset, recording: str) -> tuple[int, int, int]:
@@ -48,6 +48,21 @@ def frames_of(dataset: Dataset, result: Result) -> Iterator[tuple[Label, dict[st
         names = [name for (name,) in connection.execute(f"SELECT frame FROM labels WHERE {where}").fetchall()]
     for label in dataset.labels(names):
         yield label, roles_in(label, result)
+
+
+def verdict_at(label: Label, result: Result) -> Verdict:
+    """The verdict of a result with the label objects of one of its frames in the roles; arguments as of `roles_in`.
+
+    Values of random variables are those of the initial scene, and of no other frame.
+    """
+    roles = roles_in(label, result)
+    match result.verdict:
+        case Match(witness=witness):
+            return Match(roles, witness if label.frame == result.frame else {})
+        case Unknown(reason, cause):
+            return Unknown(reason, cause, roles)
+        case NoMatch(cause):
+            return NoMatch(cause, roles)
 
 
 def roles_in(label: Label, result: Result) -> dict[str, str]:

@@ -19,11 +19,14 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
+from msgspec import Struct
 
 from scenicq.errors import DataError, Diagnostic
-from scenicq.query.execution.records import Record, decode_record, json_text
+from scenicq.query.execution.records import Record, SummaryRecord, decode_record, json_text
+from scenicq.query.execution.result_summary import ResultCount, ResultSummary, join_summaries
 from scenicq.query.execution.results import Funnel
-from scenicq.query.execution.run import QueryOptions, RecordingRange
+from scenicq.query.execution.run import Query, QueryOptions, RecordingRange
+from scenicq.query.execution.skipped_frames import summarize
 from scenicq.store.atomic_files import made_folder, whole_file
 from scenicq.store.dataset import Dataset
 
@@ -98,15 +101,15 @@ def is_done(folder: Path, question: str, number: int, count: int) -> bool:
     return _file(folder, question, number, count).exists()
 
 
-def write_partition(folder: Path, question: str, piece: Partition, records: Iterable[Record], funnel: Funnel) -> Path:
-    """Write a finished piece: one line a record, the funnel last.
+def write_partition(folder: Path, question: str, piece: Partition, records: Iterable[Record], query: Query) -> Path:
+    """Write a finished piece: one line a record, the funnel and the summary last.
 
     Args:
         folder: Where the pieces are; made if need be.
         question: Its `fingerprint`.
         piece: Which piece.
         records: Its results, in order.
-        funnel: Its counts, complete once the records are taken.
+        query: The query of the piece; its counts are complete once the records are taken.
 
     Raises:
         DataError: target-unwritable.
@@ -114,10 +117,12 @@ def write_partition(folder: Path, question: str, piece: Partition, records: Iter
     target = _file(folder, question, piece.number, piece.count)
     try:
         with made_folder(folder), whole_file(target) as file:
-            for each in records:
+            counted = ResultCount()
+            for each in counted.counted(records):
                 file.write((json_text(each) + "\n").encode())
-            counts = {name: getattr(funnel, name) for name in _COUNTS}
-            file.write((json.dumps({"funnel": counts}) + "\n").encode())
+            counts = {name: getattr(query.funnel, name) for name in _COUNTS}
+            summary = msgspec.to_builtins(summarize(query, counted))
+            file.write((json.dumps({"funnel": counts, "summary": summary}) + "\n").encode())
     except OSError as error:
         raise DataError(Diagnostic("target-unwritable", f"{target} cannot be written: {error.strerror}")) from None
     return target
@@ -134,25 +139,42 @@ class Gathered:
         question: Its fingerprint.
         files: Their files, in order.
         funnel: Their counts, added up.
+        summary: What they say of themselves; None where one says nothing, as those of older versions.
     """
 
     question: str
     files: tuple[Path, ...]
     funnel: Funnel
+    summary: ResultSummary | None
 
     def records(self) -> Iterator[Record]:
         """The results in the order of the dataset, one piece in memory at a time."""
         for path in self.files:
-            yield from _piece(path)[0]
+            yield from _piece(path).records
 
 
-def _piece(path: Path) -> tuple[list[Record], Funnel]:
+class _Counts(Struct, frozen=True):
+    """The last line of a piece."""
+
+    funnel: dict[str, int | dict[str, int]]
+    summary: ResultSummary | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class _Piece:
+    records: list[Record]
+    funnel: Funnel
+    summary: ResultSummary | None
+
+
+def _piece(path: Path) -> _Piece:
     """The results in a file, and what was counted."""
     try:
         *lines, last = path.read_bytes().splitlines() or [b""]
-        counts = msgspec.json.decode(last, type=dict[str, dict[str, int | dict[str, int]]])["funnel"]
-        funnel = Funnel(**{name: _counted(counts[name]) for name in _COUNTS})
-        return [decode_record(line) for line in lines], funnel
+        counts = msgspec.json.decode(last, type=_Counts)
+        funnel = Funnel(**{name: _counted(counts.funnel[name]) for name in _COUNTS})
+        records = [each for line in lines if not isinstance(each := decode_record(line), SummaryRecord)]
+        return _Piece(records, funnel, counts.summary)
     except (OSError, KeyError, RecursionError, msgspec.DecodeError):
         raise DataError(Diagnostic("store-damaged", f"{path} is not a complete piece of a result",
                                    hints=("delete it and run its shard again",))) from None  # fmt: skip
@@ -191,6 +213,10 @@ def gather(folder: Path, question: str | None = None, *, only: int | None = None
         raise DataError(Diagnostic("file-missing", f"{len(missing)} of {count} pieces are missing: {shown}",
                                    hints=("run their shards again",)))  # fmt: skip
     total = Funnel()
+    summaries: list[ResultSummary | None] = []
     for path in found:
-        total.add(_piece(path)[1])
-    return Gathered(chosen, tuple(found), total)
+        piece = _piece(path)
+        total.add(piece.funnel)
+        summaries.append(piece.summary)
+    known = [each for each in summaries if each is not None]
+    return Gathered(chosen, tuple(found), total, join_summaries(known) if len(known) == len(summaries) else None)

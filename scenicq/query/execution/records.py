@@ -13,6 +13,7 @@ from msgspec import UNSET, Struct, UnsetType
 
 from scenicq.errors import Source, Span
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown, Verdict, WitnessValue
+from scenicq.query.execution.result_summary import ResultSummary
 from scenicq.query.execution.results import IntervalSpan, LogDensity, Result
 
 __all__ = [
@@ -22,6 +23,7 @@ __all__ = [
     "FramesRecord",
     "IntervalRecord",
     "Record",
+    "SummaryRecord",
     "decode_record",
     "json_text",
     "read_record",
@@ -72,6 +74,7 @@ class FrameRecord(Struct, frozen=True, kw_only=True):
             `scenicq.query.execution.results.LogDensity` has it; absent where that was not asked for.
         all_matches: Whether the file has every correspondence by which the frame matches; absent where it has one.
         dataset: The dataset and its version; absent where it is not known.
+        summary: What the file says of itself; with its last result alone.
     """
 
     frame: str
@@ -88,6 +91,7 @@ class FrameRecord(Struct, frozen=True, kw_only=True):
     no_density: str | UnsetType | None = UNSET
     all_matches: bool | UnsetType = UNSET
     dataset: str | UnsetType = UNSET
+    summary: ResultSummary | UnsetType = UNSET
 
     @property
     def name(self) -> str:
@@ -106,7 +110,7 @@ class IntervalRecord(Struct, frozen=True, kw_only=True):
         correspondence: The track of each role.
         witness, cause: As of a frame.
         open_ended: Whether the program does not say when the interval ends.
-        log_density, log_density_error, log_weight, no_density, dataset: As of a frame.
+        log_density, log_density_error, log_weight, no_density, dataset, summary: As of a frame.
     """
 
     recording: str
@@ -123,11 +127,18 @@ class IntervalRecord(Struct, frozen=True, kw_only=True):
     log_weight: float | UnsetType | None = UNSET
     no_density: str | UnsetType | None = UNSET
     dataset: str | UnsetType = UNSET
+    summary: ResultSummary | UnsetType = UNSET
 
     @property
     def name(self) -> str:
         """What tells it from the other results: its recording and where it starts."""
         return f"{self.recording}@{self.start_us}"
+
+
+class SummaryRecord(Struct, frozen=True):
+    """What stands in the place of results where there are none, and not all was looked at."""
+
+    summary: ResultSummary
 
 
 Record = FrameRecord | IntervalRecord
@@ -136,7 +147,7 @@ DENSITY = ("log_density", "log_density_error", "log_weight", "no_density")
 
 _encode = msgspec.json.Encoder().encode
 _fields = msgspec.json.Decoder(dict[str, msgspec.Raw]).decode
-_decode = {kind: msgspec.json.Decoder(kind).decode for kind in (FrameRecord, IntervalRecord)}
+_decode = {kind: msgspec.json.Decoder(kind).decode for kind in (FrameRecord, IntervalRecord, SummaryRecord)}
 
 
 def json_text(value: Any) -> str:
@@ -144,11 +155,13 @@ def json_text(value: Any) -> str:
     return msgspec.json.format(_encode(value), indent=0).decode()
 
 
-def _kind(names: Mapping[str, object]) -> type[Record]:
+def _kind(names: Mapping[str, object]) -> type[Record | SummaryRecord]:
+    if "summary" in names and len(names) == 1:
+        return SummaryRecord
     return IntervalRecord if "frames" in names else FrameRecord
 
 
-def decode_record(line: str | bytes) -> Record:
+def decode_record(line: str | bytes) -> Record | SummaryRecord:
     """The record that a line of JSON holds.
 
     Raises:
@@ -157,7 +170,7 @@ def decode_record(line: str | bytes) -> Record:
     return _decode[_kind(_fields(line))](line)
 
 
-def record_of(values: Mapping[str, Any]) -> Record:
+def record_of(values: Mapping[str, Any]) -> Record | SummaryRecord:
     """The record that plain values make; numbers and truth values may be texts, as in cells of CSV.
 
     Raises:

@@ -8,55 +8,101 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import msgspec
 import pyarrow as pa
 import pyarrow.parquet as pq
+from msgspec import UNSET, structs
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.query.execution.csv_cells import unquote_cell
-from scenicq.query.execution.records import DENSITY, Record, decode_record, record_of
-from scenicq.query.execution.result_tables import METADATA, read_row
+from scenicq.query.execution.records import DENSITY, Record, SummaryRecord, decode_record, record_of
+from scenicq.query.execution.result_summary import Completeness, ResultSummary, join_summaries
+from scenicq.query.execution.result_tables import METADATA, read_row, read_summary
 from scenicq.store.unpacked import RECORD_BYTES, Bound, check_claims, decoded_bytes, text_columns
 
-__all__ = ["read_records", "read_results"]
+__all__ = ["ReadResults", "RecordStream", "read_records", "read_results"]
+
+_T = TypeVar("_T")
 
 _NEEDED = ("frame", "recording", "verdict", "timestamp_us", "correspondence", "cause",
            "start_us", "end_us", "frames")  # fmt: skip
 """What tells what became of a result."""
-_NESTED = ("correspondence", "cause", "sensors", "witness", "frames")
+_NESTED = ("correspondence", "cause", "sensors", "witness", "frames", "summary")
 _LONGEST = 10_000_000
 """Characters of a cell of CSV."""
 
 
-def read_results(path: Path) -> dict[str, Record]:
-    """The results in a file by frame, or by recording and start; of several of one the first match counts.
+@dataclass(frozen=True, slots=True)
+class ReadResults:
+    """The results in a file.
+
+    Attributes:
+        records: By frame, or by recording and start.
+        completeness: What it means that a frame is not among them.
+    """
+
+    records: Mapping[str, Record]
+    completeness: Completeness
+
+
+def read_results(path: Path) -> ReadResults:
+    """The results in a file by name; of several of one frame the first match counts.
 
     Raises:
         DataError: file-missing, or file-invalid.
     """
     found: dict[str, Record] = {}
-    for each in _records(path, _NEEDED):
+    records = RecordStream(_records(path, _NEEDED))
+    for each in records:
         old = found.get(each.name)
         if old is None or (each.verdict == "match" and old.verdict != "match"):
             found[each.name] = each
-    return found
+    return ReadResults(found, records.completeness)
 
 
-def read_records(path: Path) -> Iterator[Record]:
+def read_records(path: Path) -> RecordStream:
     """All results in a file with all that they say: of frames, or of intervals of recordings.
 
     Raises:
-        DataError: file-missing, or file-invalid.
+        DataError: file-missing, or file-invalid; as the results are taken.
     """
-    return _records(path, None)
+    return RecordStream(_records(path, None))
 
 
-def _records(path: Path, columns: tuple[str, ...] | None) -> Iterator[Record]:
-    """The results.
+@dataclass(slots=True)
+class RecordStream:
+    """Results to be gone through once, without what they say of themselves; that is there when all are taken.
+
+    Attributes:
+        records: The results.
+    """
+
+    records: Iterable[Record | SummaryRecord]
+    _held: int = field(default=0, init=False)
+    _summaries: list[ResultSummary] = field(default_factory=list[ResultSummary], init=False)
+
+    @property
+    def completeness(self) -> Completeness:
+        """What it means that a frame is not among the results."""
+        return Completeness(join_summaries(self._summaries), self._held)
+
+    def __iter__(self) -> Iterator[Record]:
+        """The results."""
+        for each in self.records:
+            if each.summary is not UNSET:
+                self._summaries.append(each.summary)
+            if not isinstance(each, SummaryRecord):
+                self._held += 1
+                yield each if each.summary is UNSET else structs.replace(each, summary=UNSET)
+
+
+def _records(path: Path, columns: tuple[str, ...] | None) -> Iterator[Record | SummaryRecord]:
+    """What a file holds.
 
     Args:
         path: The file.
@@ -87,20 +133,20 @@ def _text(path: Path, data: bytes) -> str:
         raise _invalid(path, "it is not text in UTF-8") from None
 
 
-def _read(path: Path, where: str, read: Callable[[], Record]) -> Record:
+def _read(path: Path, where: str, read: Callable[[], _T]) -> _T:
     try:
         return read()
     except (msgspec.DecodeError, RecursionError) as error:
         raise _invalid(path, f"{where} is no result: {error}") from None
 
 
-def _of_lines(path: Path, text: str) -> Iterator[Record]:
+def _of_lines(path: Path, text: str) -> Iterator[Record | SummaryRecord]:
     for number, line in enumerate(text.split("\n"), 1):
         if line.strip():
             yield _read(path, f"line {number}", lambda line=line: decode_record(line))
 
 
-def _of_csv(path: Path, text: str) -> Iterator[Record]:
+def _of_csv(path: Path, text: str) -> Iterator[Record | SummaryRecord]:
     limit = csv.field_size_limit(_LONGEST)
     try:
         rows = csv.DictReader(io.StringIO(text, newline=""), strict=True)
@@ -124,10 +170,10 @@ def _values(row: Mapping[str, Any]) -> dict[str, Any]:
             found[name] = msgspec.json.decode(text) if name in _NESTED and isinstance(text, str) else text
     if found.get("cause") == {}:
         del found["cause"]
-    return found
+    return {"summary": found["summary"]} if not found.get("verdict") and "summary" in found else found
 
 
-def _of_parquet(path: Path, data: bytes, columns: tuple[str, ...] | None) -> Iterator[Record]:
+def _of_parquet(path: Path, data: bytes, columns: tuple[str, ...] | None) -> Iterator[Record | SummaryRecord]:
     try:
         bound = Bound(path, len(data))
         with pq.ParquetFile(pa.BufferReader(data)) as parquet:
@@ -135,6 +181,7 @@ def _of_parquet(path: Path, data: bytes, columns: tuple[str, ...] | None) -> Ite
             check_claims(parquet, bound, chosen)
             bound.check(RECORD_BYTES * parquet.metadata.num_rows)
             texts = text_columns(parquet)
+            metadata = parquet.metadata.metadata
         table = pq.read_table(pa.BufferReader(data), columns=chosen, read_dictionary=texts)
         for chunk in (chunk for column in table.columns for chunk in column.chunks):
             bound.add(decoded_bytes(chunk))
@@ -144,3 +191,5 @@ def _of_parquet(path: Path, data: bytes, columns: tuple[str, ...] | None) -> Ite
     rows: list[dict[str, Any]] = table.to_pylist()
     for number, row in enumerate(rows, 1):
         yield _read(path, f"row {number}", lambda row=row: read_row(row, origin))
+    if (summary := _read(path, "its summary", lambda: read_summary(metadata))) is not None:
+        yield SummaryRecord(summary)

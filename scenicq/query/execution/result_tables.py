@@ -6,7 +6,7 @@ cause            struct   what, detail, place, reason; null in a match
 sensors          map      channel -> path
 frames           struct   of an interval: first, last, count
 
-The dataset stands in the metadata.
+The dataset and the summary stand in the metadata.
 """
 
 # pyarrow has no type stubs.
@@ -22,12 +22,15 @@ import msgspec
 import pyarrow as pa
 from msgspec import inspect
 
-from scenicq.query.execution.records import DENSITY, FrameRecord, IntervalRecord, Record, record_of
+from scenicq.query.execution.records import DENSITY, FrameRecord, IntervalRecord, Record, json_text, record_of
+from scenicq.query.execution.result_summary import ResultSummary
 
-__all__ = ["METADATA", "read_row", "result_schema", "result_table", "roles_of"]
+__all__ = ["METADATA", "read_row", "read_summary", "result_schema", "result_table", "roles_of", "summary_metadata"]
 
 METADATA = b"scenicq.dataset"
 """Key of the metadata, under which the dataset stands."""
+_SUMMARY = b"scenicq.summary"
+"""Key of that under which the summary stands, as JSON."""
 _PLAIN: dict[type[inspect.Type], Any] = {
     inspect.StrType: pa.string,
     inspect.LiteralType: pa.string,
@@ -54,7 +57,7 @@ def result_schema(
         over_time: Whether the results are intervals.
         every: Whether each correspondence by which a frame matches is a result.
     """
-    left_out = {"dataset", *(() if ranked else DENSITY), *(() if every else ("all_matches",))}
+    left_out = {"dataset", "summary", *(() if ranked else DENSITY), *(() if every else ("all_matches",))}
     columns = [
         (each.name, pa.struct([(role, pa.string()) for role in roles]))
         if each.name == "correspondence"
@@ -95,6 +98,21 @@ def result_table(records: Iterable[Record], schema: pa.Schema) -> pa.Table:
     return pa.Table.from_pylist([_row(each) for each in records], schema=schema)
 
 
+def summary_metadata(summary: ResultSummary) -> dict[bytes, bytes]:
+    """The metadata that says a summary."""
+    return {_SUMMARY: json_text(summary).encode()}
+
+
+def read_summary(metadata: Mapping[bytes, bytes] | None) -> ResultSummary | None:
+    """The summary that metadata say, if they do.
+
+    Raises:
+        msgspec.DecodeError: It is none.
+    """
+    text = (metadata or {}).get(_SUMMARY)
+    return None if text is None else msgspec.json.decode(text, type=ResultSummary)
+
+
 def _row(record: Record) -> dict[str, Any]:
     cells: dict[str, Any] = msgspec.to_builtins(record)
     listed = ((place, [value] if isinstance(value, int | float) else value) for place, value in record.witness.items())
@@ -121,4 +139,4 @@ def read_row(row: Mapping[str, Any], origin: str = "") -> Record:
     if isinstance(witness := found.get("witness"), dict):
         numbers = cast("dict[str, list[float]]", witness)
         found["witness"] = {place: value[0] if len(value) == 1 else value for place, value in numbers.items()}
-    return record_of(found | ({"dataset": origin} if origin else {}))
+    return cast(Record, record_of(found | ({"dataset": origin} if origin else {})))

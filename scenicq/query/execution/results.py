@@ -10,7 +10,7 @@ from typing import Any
 from scenicq.errors import Diagnostic
 from scenicq.match.verdict import Match, NoMatch, Unknown, Verdict
 
-__all__ = ["Funnel", "IntervalSpan", "LogDensity", "Result"]
+__all__ = ["Funnel", "IntervalSpan", "LogDensity", "Result", "Sample"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,6 +76,21 @@ class Result:
         return Result, (self.frame, self.recording, self.timestamp_us, self.verdict, self.sensors, self.interval)
 
 
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """What a sample of matches was drawn from.
+
+    Attributes:
+        shown: How many matches are in it.
+        of: How many there were.
+        unknown: How many frames or intervals were undecided, by the reason: none of them is in it.
+    """
+
+    shown: int
+    of: int
+    unknown: Counter[str]
+
+
 @dataclass(slots=True)
 class Funnel:
     """How many frames are left after each step, and what the others failed at first.
@@ -94,6 +109,8 @@ class Funnel:
         missing: Frames of the dataset in which a property that the program sets is missing, although others have it.
         warnings: What the user should know, such as a map that the program does not fit.
         cut: Whether the time was over before all frames were decided.
+        limited: The match with which a limit ended the query; None where none did.
+        sample: What the results were drawn from; None where all are shown.
     """
 
     frames: int = 0
@@ -108,6 +125,8 @@ class Funnel:
     missing: dict[str, int] = field(default_factory=dict[str, int])
     warnings: list[Diagnostic] = field(default_factory=list[Diagnostic])
     cut: bool = False
+    limited: Result | None = None
+    sample: Sample | None = None
 
     def add(self, other: Funnel) -> None:
         """Count in what was found elsewhere."""

@@ -398,6 +398,7 @@ class Query:
                         if left is not None and isinstance(result.verdict, Match):
                             left -= 1
                             if left <= 0:
+                                self.funnel.limited = result
                                 return
                 if self.funnel.cut:
                     return

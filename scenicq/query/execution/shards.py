@@ -153,7 +153,8 @@ def kept(engine: Engine, folder: Path) -> Engine:
                         # only whole pieces are kept
                         yield piece, (results, funnel)
                         return
-                    write_partition(folder, question, piece, map(record, results), funnel)
+                    asked = replace(query, recordings=piece.recordings, funnel=funnel)
+                    write_partition(folder, question, piece, map(record, results), asked)
                     yield piece, (results, funnel)
                 else:
                     found = gather(folder, question, only=piece.number)
@@ -179,6 +180,7 @@ def in_order(query: Query, engine: Engine, pieces: Iterable[Partition], progress
             if isinstance(result.verdict, Match) and left is not None:
                 left -= 1
                 if left <= 0:
+                    query.funnel.limited = result
                     return
         if funnel.cut:
             return

@@ -229,7 +229,9 @@ def show_explanation(explanation: Explanation) -> str:
     if isinstance(verdict, Unknown):
         lines[0] += f": {verdict.reason}"
     kind = "correspondence" if isinstance(verdict, Match) else "closest correspondence"
-    lines += [f"{kind}: {', '.join(f'{name} = {played}' for name, played in explanation.correspondence.items())}"]
+    if explanation.correspondence or isinstance(verdict, NoMatch):
+        roles = ", ".join(f"{name} = {played}" for name, played in explanation.correspondence.items())
+        lines.append(f"{kind}: {roles}")
     if explanation.proofs:
         lines += ["", "it matches with these values:", *_show_proofs(explanation.proofs)]
     if explanation.margins:
@@ -238,7 +240,7 @@ def show_explanation(explanation: Explanation) -> str:
         lines += ["", _show_violation(violation)]
     if explanation.closest is not None:
         lines += ["", *_show_advice(explanation.closest)]
-    elif not isinstance(verdict, Match):
+    elif isinstance(verdict, NoMatch):
         lines += ["", "no tolerance would make it match"]
     return "\n".join(lines)
 

@@ -4,22 +4,24 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from scenicq.errors import DataError, Diagnostic, render
+from scenicq.errors import Diagnostic, render
 from scenicq.forest.scenario import Scenario
 from scenicq.limits import LIMITS
 from scenicq.match.matcher import Matcher
-from scenicq.match.verdict import Match, NoMatch
+from scenicq.match.verdict import Cause, Match, NoMatch, Unknown, Verdict
 from scenicq.query.execution.interval_frames import locate
 from scenicq.query.execution.recording_matcher import CUT_OFF
 from scenicq.query.execution.recording_starts import DecidedStart, few_findings, start_table, starts_of
 from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query
 from scenicq.query.explain.bands import Band, bands_of, columns_of, show_bands
+from scenicq.query.explain.frame_explanation import explain, show_explanation
 from scenicq.query.explain.interval_changes import Change, least_changes
+from scenicq.query.explain.moments import frame_time, intervals_around
 from scenicq.smt.answer import Solver
 from scenicq.store.labels import Label
 from scenicq.store.track_block import TrackBlock
@@ -28,12 +30,11 @@ from scenicq.temporal.intervals import IntervalMatcher, IntervalVerdict
 from scenicq.temporal.starts import start_matchers
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN
 
-__all__ = ["IntervalExplanation", "changes_of", "explain_recording", "placed"]
+__all__ = ["IntervalExplanation", "changes_of", "explain_beginning", "explain_recording", "placed"]
 
 
-_ROUNDED_S = 0.05
-"""Seconds are shown to a tenth."""
-
+_AROUND_SHOWN = 5
+"""Intervals around a frame that are named."""
 
 _Start = tuple[DecidedStart, int]
 """A start, and the number of the outcome of the choices over time."""
@@ -51,6 +52,8 @@ class IntervalExplanation:
         changes: What one number of the program would have to be for the interval to match.
         failed: What frames failed at that do not match the initial scene.
         example: One of the frames that failed at what the fewest did.
+        undecided: How many frames are unknown to match the initial scene, by the reason.
+        least_s: How many seconds an interval of a program about one instant was to have; None of other programs.
     """
 
     tracks: RecordingTracks
@@ -60,11 +63,15 @@ class IntervalExplanation:
     changes: tuple[str, ...] = ()
     failed: Counter[str] | None = None
     example: str = ""
+    undecided: Counter[str] = field(default_factory=Counter[str])
+    least_s: float | None = None
 
     @property
     def is_unknown(self) -> bool:
-        """Whether it may match."""
-        return self.interval is not None and self.interval.truth not in (TRUE, FALSE)
+        """Whether it may match: an interval is unknown, or it is unknown whether one begins at a frame."""
+        if self.matches:
+            return False
+        return bool(self.undecided) or (self.interval is not None and self.interval.truth != FALSE)
 
     @property
     def matches(self) -> bool:
@@ -78,22 +85,37 @@ class IntervalExplanation:
             counted = (self.failed or Counter()).most_common()
             rows = [f"  {count:>6,}  {what}" for what, count in counted]
             hint = [f"  = hint: `scenicq explain` with the frame {self.example} says how far that one is"]
+            if not counted:
+                return "\n".join([f"no frame of {tracks.name} surely matches the initial scene", *self._undecided()])
             head = f"no frame of {tracks.name} matches the initial scene; they fail at"
-            return "\n".join([head, *rows, *(hint if self.example else ())])
+            return "\n".join([head, *rows, *self._undecided(), *(hint if self.example else ())])
         first, last = float(tracks.seconds[interval.start]), float(tracks.seconds[interval.end])
+        frames = interval.end - interval.start + 1
         said = "matches" if interval.truth == TRUE else "does not match" if interval.truth == FALSE else "is unknown"
         if interval.reason:
             said += f" ({interval.reason})"
         lines = [
             f"recording {tracks.name} {said} from {first:.1f} s to {last:.1f} s "
-            f"({interval.end - interval.start + 1} frames from {tracks.frames[interval.start]})",
+            f"({frames} {'frame' if frames == 1 else 'frames'} from {tracks.frames[interval.start]})",
             f"{'' if self.matches else 'closest '}correspondence: {', '.join(f'{r} = {t}' for r, t in self.roles)}",
         ]
         if interval.cut_off:
             lines.append(f"cut off: the recording or a track ends at {last:.1f} s, before the program does")
             lines += [f"  = {each}" for each in self.changes if interval.broken is None]
+        if self.least_s is not None and interval.truth == FALSE:
+            lines.append(
+                f"each of these frames matches, for {last - first:.1f} s; --min-duration asks for {self.least_s:g} s"
+            )
+        lines += self._undecided() if not self.matches else ()
         lines += ["", *self._broken(interval)]
         return "\n".join([*lines, *show_bands(self.bands)]).rstrip()
+
+    def _undecided(self) -> list[str]:
+        """How many frames are unknown to match the initial scene."""
+        return [
+            f"  {count:>6,}  {'is' if count == 1 else 'are'} unknown: {reason}"
+            for reason, count in self.undecided.most_common()
+        ]
 
     def _broken(self, interval: IntervalVerdict) -> list[str]:
         """The requirement that is broken, where, when, and by how much."""
@@ -136,24 +158,6 @@ class IntervalExplanation:
         return found
 
 
-def _frame_time(tracks: RecordingTracks, begins: int | float) -> int:
-    """The timestamp of the frame at a timestamp, or nearest to some seconds from where the recording begins."""
-    times, seconds = tracks.times_us.tolist(), tracks.seconds
-    if isinstance(begins, int):
-        if begins in times:
-            return begins
-        told = str(begins)
-    else:
-        place = int(np.argmin(abs(seconds - begins)))
-        apart = np.diff(seconds)
-        if abs(float(seconds[place]) - begins) <= (float(np.median(apart)) / 2 if len(apart) else 0.0) + _ROUNDED_S:
-            return times[place]
-        told = f"{begins:g} s"
-    frames = ", ".join(f"{time} ({second:.1f} s)" for time, second in zip(times[:3], seconds.tolist(), strict=False))
-    hint = f"its {len(times):,} frames are at {frames} ... to {float(seconds[-1]):.1f} s"
-    raise DataError(Diagnostic("option-invalid", f"{tracks.name} has no frame at {told}", hints=(hint,)))
-
-
 def explain_recording(query: Query, solver: Solver, name: str, begins: int | float | None) -> IntervalExplanation:
     """Explain a recording.
 
@@ -174,31 +178,39 @@ def explain_recording(query: Query, solver: Solver, name: str, begins: int | flo
     scenario, _ = query.compile(labels[0].map)
     intervals = IntervalMatcher(scenario, query.options.match, query.options.time, solver)
     matchers = start_matchers(Matcher(scenario, query.options.match, solver), intervals.outcomes)
-    time_us = None if begins is None else _frame_time(tracks, begins)
+    # an interval of a program about one instant is made of frames that all match
+    dynamic = scenario.dynamics is not None
+    time_us = None if begins is None else frame_time(name, tracks.times_us.tolist(), begins)
     failed: Counter[str] = Counter()
+    undecided: Counter[str] = Counter()
     examples: dict[str, str] = {}
     with TrackBlock(query.dataset, part, [(first, end)]) as block:
         starts: list[_Start] = []
         known: Counter[str] = Counter()
         for sample, label in enumerate(labels):
-            if time_us is not None and label.timestamp_us != time_us:
+            if time_us is not None and label.timestamp_us != time_us and (dynamic or label.timestamp_us < time_us):
                 continue
             members = [
                 int(block.ego(np.array([sample]))[0]),
                 *range(*block.object_starts[sample : sample + 2].tolist()),
             ]
             causes: list[str] = []
+            unknown: list[str] = []
             before = len(starts)
             for outcome, matcher in enumerate(matchers):
                 findings = few_findings(matcher, label, known)
-                found = starts_of(scenario, block, label, members, findings)
+                found = [*starts_of(scenario, block, label, members, findings)]
                 starts += [(each, outcome) for each in found if isinstance(each, DecidedStart)]
+                unknown = [each.reason for each in found if isinstance(each, Unknown)] or unknown
                 causes += [each.verdict.cause.what for each in findings if not isinstance(each.verdict, Match)]
-            if len(starts) == before:
+            undecided.update(unknown[:1])
+            if len(starts) == before and not unknown:
                 what = causes[0] if causes else "tracks"
                 failed[what] += 1
                 examples.setdefault(what, label.frame)
         results = _intervals(intervals, scenario, block, starts)
+        if time_us is not None:
+            results = [each for each in results if int(tracks.times_us[each.start]) == time_us]
         # what is cut off is looked at where no run comes to its end
         whole = starts
         for _ in range(LIMITS.cut_off_rounds):
@@ -209,11 +221,82 @@ def explain_recording(query: Query, solver: Solver, name: str, begins: int | flo
             results = _intervals(intervals, scenario, block, whole)
     if not results:
         rarest = min(failed, key=lambda what: failed[what], default="")
-        return IntervalExplanation(tracks, None, failed=failed, example=examples.get(rarest, ""))
+        example = examples.get(rarest, "")
+        return IntervalExplanation(tracks, None, failed=failed, example=example, undecided=undecided)
     best = max(results, key=lambda each: (each.truth, each.cut_off, each.end - each.start))
     roles = tuple((scenario.objects[index].name, track[1] or "ego") for index, track in best.binding)
     changes = tuple(change.text() for change in changes_of(scenario, tracks, best))
-    return IntervalExplanation(tracks, best, roles, bands_of(scenario, tracks, best), changes)
+    bands = bands_of(scenario, tracks, best)
+    least_s = None if dynamic else query.options.time.min_duration_s
+    return IntervalExplanation(tracks, best, roles, bands, changes, undecided=undecided, least_s=least_s)
+
+
+def explain_beginning(query: Query, solver: Solver, label: Label) -> tuple[Verdict, str]:
+    """Explain whether an interval begins at a frame, and name those that the frame lies in.
+
+    Args:
+        query: A query over time.
+        solver: Decides what is not decided otherwise.
+        label: The frame.
+
+    Returns:
+        What became of the interval that begins there, and the explanation for a person.
+    """
+    if query.compiled_map(label.map).scenario.dynamics is None:
+        return _explain_within(query, solver, label)
+    begun = explain_recording(query, solver, label.recording, label.timestamp_us)
+    verdict: Verdict
+    if begun.interval is None:
+        # without a start, the frame itself is what keeps an interval from beginning
+        scene = explain(Matcher(query.compile(label.map)[0], query.options.match, solver), label)
+        verdict = scene.verdict if isinstance(scene.verdict, Unknown) else NoMatch(Cause("initial scene"))
+        text = show_explanation(scene)
+        if isinstance(scene.verdict, Match):
+            text = f"no interval begins at this frame: its objects have no tracks; of the initial scene:\n{text}"
+    else:
+        verdict = Match({}, {}) if begun.matches else NoMatch(Cause("over time"))
+        verdict = Unknown("", Cause("over time")) if begun.is_unknown else verdict
+        text = begun.text()
+    others = [each for each in intervals_around(query, label) if each.timestamp_us != label.timestamp_us]
+    lines = _listed(others)
+    head = "the frame lies in intervals that begin before it:" if lines else ""
+    return verdict, "\n".join([text, *(["", head, *lines] if lines else ())])
+
+
+def _explain_within(query: Query, solver: Solver, label: Label) -> tuple[Verdict, str]:
+    """Explain whether a frame lies in an interval of a program about one instant, which has no beginning of its own."""
+    scene = explain(Matcher(query.compile(label.map)[0], query.options.match, solver), label)
+    around = intervals_around(query, label)
+    text = show_explanation(scene)
+    if around:
+        text += "\n\n" + "\n".join(["the frame lies in these intervals:", *_listed(around)])
+        return around[0].verdict, text
+    if not isinstance(scene.verdict, Match):
+        return scene.verdict, text
+    least_s = query.options.time.min_duration_s or 0.0
+    told = (
+        f"it lies in no interval of {least_s:g} s in which every frame matches with the same objects (--min-duration)"
+    )
+    text += f"\n\n{told}"
+    return NoMatch(Cause("--min-duration")), text
+
+
+def _listed(intervals: Sequence[Result]) -> list[str]:
+    """Intervals, one a line."""
+    lines = [_around(each) for each in intervals[:_AROUND_SHOWN]]
+    return lines if len(intervals) <= len(lines) else [*lines, f"  and {len(intervals) - len(lines)} more"]
+
+
+def _around(result: Result) -> str:
+    """An interval in a line."""
+    assert result.interval is not None
+    verdict = result.verdict
+    roles = verdict.partial if isinstance(verdict, NoMatch) else verdict.correspondence
+    told = "matches" if isinstance(verdict, Match) else f"unknown ({verdict.reason})" if isinstance(
+        verdict, Unknown) else "does not match"  # fmt: skip
+    seconds = (result.interval.end_us - result.timestamp_us) / 1e6
+    played = ", ".join(f"{role} = {track}" for role, track in roles.items())
+    return f"  {result.recording}@{result.timestamp_us}: {told}, {seconds:.1f} s, {played}"
 
 
 def changes_of(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
 import time
@@ -102,7 +103,9 @@ def test_the_command_says_that_it_stopped_and_goes_on(run: Any, crossroads: Path
     assert stopped.exit_code == 3
     assert "warning[deadline-passed]" in stopped.stderr
     assert "goes on from here" in stopped.stderr
-    assert (tmp_path / "found.jsonl").read_text(encoding="utf-8") == ""
+    said = json.loads((tmp_path / "found.jsonl").read_text(encoding="utf-8"))
+    assert said.keys() == {"summary"}
+    assert [each["why"] for each in said["summary"]["skipped"]] == ["deadline"]
     assert run(*words).exit_code == 0
     assert sorted(path.name for path in tmp_path.iterdir()) == ["found.jsonl"]
 

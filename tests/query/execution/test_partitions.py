@@ -13,7 +13,7 @@ from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import EXACT, parse_tolerance
 from scenicq.query.execution.partitions import Partition, fingerprint, gather, is_done, partitions, write_partition
 from scenicq.query.execution.program_files import read_program
-from scenicq.query.execution.records import record
+from scenicq.query.execution.records import FrameRecord, record
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.query.execution.shards import kept, run_here
 from scenicq.store.dataset import Dataset, open_dataset
@@ -35,7 +35,7 @@ def run_shard(dataset: Dataset, folder: Path, piece: Partition, options: QueryOp
     query = Query(dataset, source, options, recordings=piece.recordings)
     question = fingerprint(dataset, source.text, options)
     records = (record(result) for result in query.results())
-    return write_partition(folder, question, piece, records, query.funnel)
+    return write_partition(folder, question, piece, records, query)
 
 
 def whole(dataset: Dataset) -> tuple[list[dict], Query]:
@@ -105,12 +105,12 @@ def test_a_failed_piece_leaves_nothing_behind(dataset, tmp_path):
     (piece,) = partitions(dataset, 1)
 
     def broken():
-        yield {"frame": "1"}
+        yield FrameRecord(frame="1", recording="r", verdict="match")
         raise KeyboardInterrupt
 
     query = Query(dataset, read_program(PROGRAM), OPTIONS)
     with pytest.raises(KeyboardInterrupt):
-        write_partition(tmp_path, "question", piece, broken(), query.funnel)
+        write_partition(tmp_path, "question", piece, broken(), query)
     assert list(tmp_path.iterdir()) == []
 
 

@@ -1,0 +1,191 @@
+"""What a result says of itself: how it was made, and of which frames it says nothing.
+
+A frame that a result does not name does not match, unless nobody has looked at it, or its match was left out. Files
+carry a summary with their last result, so that whoever reads them can tell the two apart.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Literal
+
+from msgspec import UNSET, Struct, UnsetType
+
+from scenicq.errors import Diagnostic
+
+if TYPE_CHECKING:
+    from scenicq.query.execution.records import Record
+
+__all__ = ["Completeness", "ResultCount", "ResultSummary", "Stretch", "join_summaries"]
+
+End = Literal["deadline", "limit"]
+"""What ends a query before all frames are looked at."""
+
+
+class Stretch(Struct, frozen=True, omit_defaults=True, kw_only=True):
+    """Frames that follow each other in the order of recording, time and frame, and that nobody has looked at.
+
+    Attributes:
+        why: What ended the query.
+        frames: How many they are.
+        first, last: Their first and their last recording.
+        from_us, from_frame: The first of them in the first recording; absent where that is its first frame.
+    """
+
+    why: End
+    frames: int
+    first: str
+    last: str
+    from_us: int | UnsetType = UNSET
+    from_frame: str | UnsetType = UNSET
+
+    def has(self, recording: str, timestamp_us: int, frame: str) -> bool:
+        """Whether a frame is one of them."""
+        if not self.first <= recording <= self.last:
+            return False
+        if recording > self.first or self.from_us is UNSET or self.from_frame is UNSET:
+            return True
+        return (timestamp_us, frame) >= (self.from_us, self.from_frame)
+
+
+class ResultSummary(Struct, frozen=True, omit_defaults=True, kw_only=True):
+    """How a result was made, and what it does not say.
+
+    Attributes:
+        complete: Whether every frame was looked at, and all that was found is there.
+        results: How many results there are.
+        frames: How many frames were asked about.
+        unknown: How many frames or intervals are undecided, by the reason.
+        all_matches: Whether every correspondence of a frame is a result; else one of each frame is.
+        limit: Matches after which the query was to stop.
+        sample: How many matches were drawn, where not all were wanted.
+        sampled_from: Of how many.
+        skipped: Frames that nobody has looked at.
+        variables: What the program says at the place of each random variable of its author's, for readers of witnesses.
+    """
+
+    complete: bool
+    results: int
+    frames: int
+    unknown: dict[str, int] = {}
+    all_matches: bool = False
+    limit: int | UnsetType = UNSET
+    sample: int | UnsetType = UNSET
+    sampled_from: int | UnsetType = UNSET
+    skipped: tuple[Stretch, ...] = ()
+    variables: dict[str, str] = {}
+
+    @property
+    def why_cut(self) -> str:
+        """What it leaves out, in words; "" where it is complete."""
+        told: list[str] = []
+        skipped = Counter[End]()
+        for each in self.skipped:
+            skipped[each.why] += each.frames
+        for why, frames in skipped.items():
+            limit = f" {self.limit}" if why == "limit" and self.limit is not UNSET else ""
+            told.append(f"--{why}{limit} ended the query before {frames:,} of {self.frames:,} frames were looked at")
+        if self.sample is not UNSET and not self.complete:
+            told.append(f"--sample shows {self.sample:,} of {self.sampled_from or 0:,} matches")
+        return ", and ".join(told) or ("" if self.complete else "something was left out")
+
+
+def join_summaries(parts: Sequence[ResultSummary]) -> ResultSummary | None:
+    """The summary of results that are put together, such as those of shards; None where there are none."""
+    if not parts:
+        return None
+    unknown = Counter[str]()
+    for each in parts:
+        unknown.update(each.unknown)
+    sampled = [each for each in parts if each.sample is not UNSET]
+    return ResultSummary(
+        complete=all(each.complete for each in parts),
+        results=sum(each.results for each in parts),
+        frames=sum(each.frames for each in parts),
+        unknown=dict(sorted(unknown.items())),
+        all_matches=all(each.all_matches for each in parts),
+        limit=next((each.limit for each in parts if each.limit is not UNSET), UNSET),
+        sample=sum(each.sample or 0 for each in sampled) if sampled else UNSET,
+        sampled_from=sum(each.sampled_from or 0 for each in sampled) if sampled else UNSET,
+        skipped=tuple(stretch for each in parts for stretch in each.skipped),
+        variables={place: text for each in parts for place, text in each.variables.items()},
+    )
+
+
+@dataclass(slots=True)
+class ResultCount:
+    """Counts results as they are written.
+
+    Attributes:
+        results: How many.
+        unknown: How many of them are undecided, by the reason.
+    """
+
+    results: int = 0
+    unknown: Counter[str] = field(default_factory=Counter[str])
+
+    def counted(self, records: Iterable[Record]) -> Iterable[Record]:
+        """The same records, counted as they are taken."""
+        for each in records:
+            self.add(each)
+            yield each
+
+    def add(self, record: Record) -> None:
+        """Count one."""
+        self.results += 1
+        if record.verdict == "unknown":
+            self.unknown[record.cause.reason if record.cause else ""] += 1
+
+
+@dataclass(frozen=True, slots=True)
+class Completeness:
+    """What results that were read say by saying nothing.
+
+    Attributes:
+        summary: What they say of themselves; None where they say nothing, as those of older versions.
+        held: How many results were read.
+    """
+
+    summary: ResultSummary | None
+    held: int
+
+    @property
+    def whole(self) -> bool:
+        """Whether every frame that is not named surely does not match."""
+        return self.summary is not None and self.summary.complete and self.summary.results == self.held
+
+    def why_silent(self, recording: str, timestamp_us: int, frame: str) -> str:
+        """Why a frame, or an interval that begins with it, is not named; "" where it does not match.
+
+        Of results that say nothing of themselves it is taken that they are complete.
+        """
+        summary = self.summary
+        if summary is None:
+            return ""
+        if summary.results != self.held:
+            return "results are missing in the file"
+        for each in summary.skipped:
+            if each.has(recording, timestamp_us, frame):
+                return f"not looked at: --{each.why} ended the query"
+        return "not in the sample" if summary.sample is not UNSET and not summary.complete else ""
+
+    def doubt(self, name: str, consequence: str) -> Diagnostic | None:
+        """A warning where the results are not complete, or nobody knows.
+
+        Args:
+            name: What messages call them.
+            consequence: What that means for the reader.
+        """
+        if self.summary is None and not self.held:
+            message = f"{name} is empty, and does not say whether all frames were looked at"
+        elif self.summary is None:
+            message = f"{name} does not say whether it is complete: an older version wrote it, or it was cut since"
+        elif self.summary.results != self.held:
+            message = f"{name} is not as it was written: it has {self.held:,} results, and had {self.summary.results:,}"
+        elif not self.summary.complete:
+            message = f"{name} is not complete: {self.summary.why_cut}"
+        else:
+            return None
+        return Diagnostic("results-incomplete", message, hints=(consequence,), severity="warning")
