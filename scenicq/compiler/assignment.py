@@ -11,7 +11,7 @@ from scenicq.compiler.environment import Environment
 from scenicq.compiler.items import items_of
 from scenicq.compiler.known_properties import known_truth
 from scenicq.compiler.logic import condition
-from scenicq.compiler.other_objects import gathered
+from scenicq.compiler.other_objects import list_elements
 from scenicq.compiler.values import Instance, LabelObjects, ModelValue, OtherList, describe, fail
 from scenicq.errors import Span
 from scenicq.forest.nodes import Node
@@ -104,7 +104,7 @@ def through_others(run: Interpreter, node: ast.Comprehension, objects: LabelObje
         conditions = tuple(to_boolean(condition(run, test, inner), test.span) for test in clause.conditions)
         return conditions, run.evaluate(node.element, inner)
 
-    return gathered(objects, clause.iterable.span, visit)
+    return list_elements(objects, clause.iterable.span, visit)
 
 
 def _nest(

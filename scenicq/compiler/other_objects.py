@@ -42,14 +42,14 @@ if TYPE_CHECKING:
 
 __all__ = [
     "count",
-    "gathered",
-    "gathered_truth",
     "how_many",
     "is_element",
     "is_nearest",
+    "list_elements",
     "nearest",
     "others",
     "same_object",
+    "truth_of_list",
 ]
 
 _FIRST_ELEMENT = -1000
@@ -118,7 +118,7 @@ def is_nearest(one: Instance, other: Nearest, span: Span) -> Node:
     return Select(seen, (build.constant(False), _both((is_there, build.opposite(someone)), span)), span=span)
 
 
-def gathered(
+def list_elements(
     objects: LabelObjects, span: Span, visit: Callable[[Instance], tuple[tuple[Node, ...], ModelValue]]
 ) -> OtherList:
     """A list with something of each of some label objects.
@@ -144,23 +144,23 @@ def same_object(one: Instance, other: Instance, span: Span) -> ModelValue:
     return _compare("==", _who(one, IDENTITY, span), _who(other, IDENTITY, span), span)
 
 
-def gathered_truth(op: str, gathered: OtherList, span: Span) -> Node:
+def truth_of_list(op: str, items: OtherList, span: Span) -> Node:
     """`any` ("or") or `all` ("and") of a list."""
-    wanted = to_boolean(gathered.value, span)
+    wanted = to_boolean(items.value, span)
     if op == "or":
-        body = _both((*gathered.conditions, wanted), span)
-        return _among(AmongOp.AT_LEAST, gathered.objects, gathered.element, body, span)
-    if gathered.conditions:
-        left_out = build.opposite(_both(gathered.conditions, span))
+        body = _both((*items.conditions, wanted), span)
+        return _among(AmongOp.AT_LEAST, items.objects, items.element, body, span)
+    if items.conditions:
+        left_out = build.opposite(_both(items.conditions, span))
         wanted = build.logic(LogicOp.OR, left_out, wanted, span=span)
-    return _among(AmongOp.EVERY, gathered.objects, gathered.element, wanted, span)
+    return _among(AmongOp.EVERY, items.objects, items.element, wanted, span)
 
 
-def how_many(gathered: OtherList | LabelObjects, span: Span) -> Node:
+def how_many(items: OtherList | LabelObjects, span: Span) -> Node:
     """`len` of a list, or of all others."""
-    if isinstance(gathered, LabelObjects):
-        return _among(AmongOp.COUNT, gathered, _element(gathered, span), build.constant(True), span)
-    return _among(AmongOp.COUNT, gathered.objects, gathered.element, _both(gathered.conditions, span), span)
+    if isinstance(items, LabelObjects):
+        return _among(AmongOp.COUNT, items, _element(items, span), build.constant(True), span)
+    return _among(AmongOp.COUNT, items.objects, items.element, _both(items.conditions, span), span)
 
 
 _FILTERS = ("within",)

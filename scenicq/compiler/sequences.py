@@ -14,7 +14,7 @@ from scenicq.compiler.comparisons import compare
 from scenicq.compiler.expressions import call
 from scenicq.compiler.items import components, is_vector, items_of
 from scenicq.compiler.known_properties import as_constant, known_truth
-from scenicq.compiler.other_objects import gathered_truth, how_many
+from scenicq.compiler.other_objects import how_many, truth_of_list
 from scenicq.compiler.random_values import each_existing, is_choice
 from scenicq.compiler.rounding import in_order
 from scenicq.compiler.values import Builtin, Choice, Function, LabelObjects, ModelValue, OtherList, fail
@@ -75,7 +75,7 @@ def sequence_functions(run: Interpreter) -> dict[str, ModelValue]:
     def quantified(op: str) -> Callable[..., ModelValue]:
         def decide(span: Span, items: ModelValue) -> ModelValue:
             if isinstance(items, OtherList):
-                return gathered_truth(op, items, span)
+                return truth_of_list(op, items, span)
             values = items_of(run, items, span)
             run.budget.step(span, len(values) // 2)
             known = [truth(value, span) for value in values if not is_random(value)]

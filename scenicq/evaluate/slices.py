@@ -39,7 +39,7 @@ class Slice:
         part: Which part.
         share: Of the part's objects that were missed.
         other: The same among the other objects; None where that makes no sense.
-        source: Of a random variable what the program says at its place, which is `by`; "" of anything else.
+        source: What the program says at the place `by` of a random variable; "" of anything else.
     """
 
     by: str

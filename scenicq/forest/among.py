@@ -22,7 +22,7 @@ from scenicq.forest.nodes import ELEMENT, RANK, Among, AmongOp, Body, Feature, L
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.walk import postorder
 
-__all__ = ["LABEL_OBJECTS", "LabelElements", "among_column", "asked_of_others", "asks_others", "joined", "taken"]
+__all__ = ["LABEL_OBJECTS", "LabelElements", "among_column", "asks_others", "joined", "properties_of_others", "taken"]
 
 _NO, _MAYBE, _YES = np.int8(0), np.int8(1), np.int8(2)
 Truths = NDArray[np.int8]
@@ -56,7 +56,7 @@ def asks_others(*roots: Node) -> bool:
     return any(isinstance(node, Among) for node in postorder(roots))
 
 
-def asked_of_others(scenario: Scenario) -> frozenset[str] | None:
+def properties_of_others(scenario: Scenario) -> frozenset[str] | None:
     """The properties that a scenario asks of label objects that may play no role; None where it asks none."""
     todo = [each.condition for each in scenario.requirements]
     todo += scenario.dynamics.conditions if scenario.dynamics is not None else ()

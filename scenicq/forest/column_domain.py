@@ -69,7 +69,7 @@ from scenicq.forest.nodes import (
 from scenicq.geometry.angles import azimuth_array, wrap_array
 from scenicq.geometry.boxes import box_polygons
 from scenicq.geometry.containment import covers_many
-from scenicq.geometry.driven_courses import CoursePlace, measured
+from scenicq.geometry.driven_courses import CoursePlace, measure
 from scenicq.geometry.fields import VectorField
 from scenicq.geometry.membership import contains_many, distance_many
 from scenicq.geometry.regions import SLACK, PolygonSet, Region
@@ -324,7 +324,7 @@ class ColumnDomain:
         self._check(len(places.defined), "courses")
         which: list[int] = places.spread(courses.which)[places.defined].tolist()
         mine = [cast(CoursePlace, courses.options[number]) for number in which]
-        found = measured(mine, places.points(args[1].data))
+        found = measure(mine, places.points(args[1].data))
         low, high = (found.end(node.axis, end) for end in (0, 1))
         status, data = places.status.copy(), np.full(places.count, np.nan)
         data[places.defined] = np.clip(high if node.end == 1 else low, -FAR_M, FAR_M)

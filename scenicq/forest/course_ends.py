@@ -25,7 +25,7 @@ from scenicq.forest.nodes import (
 )
 from scenicq.forest.walk import children, postorder, transform
 
-__all__ = ["Truths", "connected", "has_ends", "joined", "opposite", "truths_by_ends"]
+__all__ = ["Truths", "connect", "has_ends", "join", "opposite", "truths_by_ends"]
 
 Truths = tuple[Node, Node]
 """A condition that holds only where another surely holds, and one that holds wherever that may hold."""
@@ -37,12 +37,12 @@ def opposite(truths: Truths) -> Truths:
     return build.opposite(possible), build.opposite(certain)
 
 
-def joined(op: LogicOp, *args: Truths) -> Truths:
+def join(op: LogicOp, *args: Truths) -> Truths:
     """`and` or `or`; what is known of the operands decides it where that is enough."""
-    return connected(op, [certain for certain, _ in args]), connected(op, [possible for _, possible in args])
+    return connect(op, [certain for certain, _ in args]), connect(op, [possible for _, possible in args])
 
 
-def connected(op: LogicOp, args: list[Node]) -> Node:
+def connect(op: LogicOp, args: list[Node]) -> Node:
     """`and` or `or` of conditions, without those that are known."""
     decisive = op is LogicOp.OR
     if any(_is(arg, decisive) for arg in args):
@@ -71,7 +71,7 @@ def truths_by_ends(node: Node) -> Truths:
     exact = [build.compare(CompareOp.LE, replace(each, end=1), lower[id(each)], node.span) for each in numbers]
     same = transform(node, lambda each: lower.get(id(each), each))
     inexact = [build.opposite(each) for each in exact]
-    return connected(LogicOp.AND, [*exact, same]), connected(LogicOp.OR, [*inexact, same])
+    return connect(LogicOp.AND, [*exact, same]), connect(LogicOp.OR, [*inexact, same])
 
 
 def _compared(node: Compare, left: Truths, right: Truths) -> Truths:
@@ -85,7 +85,7 @@ def _compared(node: Compare, left: Truths, right: Truths) -> Truths:
         case CompareOp.GT | CompareOp.GE:
             return less(MIRRORED[node.op], right, left)
         case CompareOp.EQ | CompareOp.NE:
-            same = joined(LogicOp.AND, less(CompareOp.LE, left, right), less(CompareOp.LE, right, left))
+            same = join(LogicOp.AND, less(CompareOp.LE, left, right), less(CompareOp.LE, right, left))
             return same if node.op is CompareOp.EQ else opposite(same)
 
 

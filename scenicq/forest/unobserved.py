@@ -15,7 +15,7 @@ from dataclasses import replace
 
 from scenicq.errors import Span
 from scenicq.forest import build
-from scenicq.forest.course_ends import Truths, connected, has_ends, joined, opposite, truths_by_ends
+from scenicq.forest.course_ends import Truths, connect, has_ends, join, opposite, truths_by_ends
 from scenicq.forest.kinds import kind_of
 from scenicq.forest.nodes import (
     MIRRORED,
@@ -114,11 +114,11 @@ class _Reader:
 
             cases.append(self.apart(transform(root, given), splits - 1))
         (sure, may), (sure_not, may_not) = cases
-        either = connected(LogicOp.AND, [
-            connected(LogicOp.OR, [build.opposite(possible), sure]), connected(LogicOp.OR, [certain, sure_not]),
+        either = connect(LogicOp.AND, [
+            connect(LogicOp.OR, [build.opposite(possible), sure]), connect(LogicOp.OR, [certain, sure_not]),
         ])  # fmt: skip
-        some = connected(LogicOp.OR, [
-            connected(LogicOp.AND, [possible, may]), connected(LogicOp.AND, [build.opposite(certain), may_not]),
+        some = connect(LogicOp.OR, [
+            connect(LogicOp.AND, [possible, may]), connect(LogicOp.AND, [build.opposite(certain), may_not]),
         ])  # fmt: skip
         return either, some
 
@@ -187,13 +187,13 @@ class _Reader:
             case Logic(op=LogicOp.NOT, args=(arg,)) if id(arg) in found:
                 return opposite(found[id(arg)])
             case Logic() if node.op is not LogicOp.NOT and all(id(arg) in found for arg in node.args):
-                return joined(node.op, *(found[id(arg)] for arg in node.args))
+                return join(node.op, *(found[id(arg)] for arg in node.args))
             case Select() if all(id(option) in found for option in node.options):
                 return _chosen(node, found, index_known=id(node.index) not in reading)
             case Compare(op=CompareOp.EQ | CompareOp.NE) if kind_of(node.left) == kind_of(node.right) == "boolean":
                 one, other = found[id(node.left)], found[id(node.right)]
-                same = joined(LogicOp.OR, joined(LogicOp.AND, one, other),
-                               joined(LogicOp.AND, opposite(one), opposite(other)))  # fmt: skip
+                same = join(LogicOp.OR, join(LogicOp.AND, one, other),
+                               join(LogicOp.AND, opposite(one), opposite(other)))  # fmt: skip
                 return same if node.op is CompareOp.EQ else opposite(same)
             case Compare(left=Arithmetic(op=ArithmeticOp.MIN | ArithmeticOp.MAX) as extreme):
                 return self._of_extreme(node.op, extreme, node.right, node.span, selects)
@@ -208,11 +208,11 @@ class _Reader:
         """The same of `min(a, b) < c` and its like: one operand, or each, is beyond; `==` is both ways."""
         if op not in MIRRORED:
             sides = (self._of_extreme(each, extreme, bound, span, selects) for each in (CompareOp.LE, CompareOp.GE))
-            same = joined(LogicOp.AND, *sides)
+            same = join(LogicOp.AND, *sides)
             return same if op is CompareOp.EQ else opposite(same)
         least, below = extreme.op is ArithmeticOp.MIN, op in (CompareOp.LT, CompareOp.LE)
         parts = [self.truths(build.compare(op, arg, bound, span), selects) for arg in extreme.args]
-        return joined(LogicOp.OR if least is below else LogicOp.AND, *parts)
+        return join(LogicOp.OR if least is below else LogicOp.AND, *parts)
 
     def _atom(self, node: Node, reading: set[int], selects: int) -> Truths:
         """The same of a condition on values: what is the same for all outcomes of a choice inside is known."""
@@ -238,12 +238,12 @@ def _chosen(node: Select, found: dict[int, Truths], *, index_known: bool) -> Tru
     if index_known:
         certain, possible = (tuple(option[place] for option in options) for place in (0, 1))
         return Select(node.index, certain, span=node.span), Select(node.index, possible, span=node.span)
-    every, some = joined(LogicOp.AND, *options)[0], joined(LogicOp.OR, *options)[1]
+    every, some = join(LogicOp.AND, *options)[0], join(LogicOp.OR, *options)[1]
     if id(node.index) not in found:
         return every, some
     index, (no, yes) = found[id(node.index)], options
-    chosen = joined(LogicOp.OR, joined(LogicOp.AND, index, yes), joined(LogicOp.AND, opposite(index), no))
-    return joined(LogicOp.OR, chosen, (every, every))[0], chosen[1]
+    chosen = join(LogicOp.OR, join(LogicOp.AND, index, yes), join(LogicOp.AND, opposite(index), no))
+    return join(LogicOp.OR, chosen, (every, every))[0], chosen[1]
 
 
 def _of_speed(node: Node, reading: set[int]) -> Truths:

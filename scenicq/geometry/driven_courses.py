@@ -34,7 +34,7 @@ from scenicq.geometry.elements import Lane
 from scenicq.geometry.network import Network
 from scenicq.geometry.regions import PolygonSet, PolylineSet, Region
 
-__all__ = ["BEYOND_M", "GAP_S", "CourseLine", "CoursePlace", "Measures", "lane_course", "measured", "track_courses"]
+__all__ = ["BEYOND_M", "GAP_S", "CourseLine", "CoursePlace", "Measures", "lane_course", "measure", "track_courses"]
 
 Numbers = NDArray[np.float64]
 
@@ -182,7 +182,7 @@ class CoursePlace:
         if found is None:
             if len(known) >= _KNOWN:
                 known.clear()
-            measures = measured([self], np.array([[x, y]]))
+            measures = measure([self], np.array([[x, y]]))
             low, high, right, left = (float(each[0]) for each in (*measures.along, *measures.beside))
             found = known[asked] = low, high, right, left
         return found
@@ -191,7 +191,7 @@ class CoursePlace:
 NO_COURSE = CoursePlace(None)
 
 
-def measured(courses: Sequence[CoursePlace], xy: Numbers) -> Measures:
+def measure(courses: Sequence[CoursePlace], xy: Numbers) -> Measures:
     """How far places are along and beside courses, place by place.
 
     Args:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from scenicq.budget import look
 from scenicq.errors import Span
-from scenicq.forest.among import asked_of_others
+from scenicq.forest.among import properties_of_others
 from scenicq.forest.condition import expand
 from scenicq.forest.nodes import Node
 from scenicq.forest.scenario import Scenario
@@ -146,7 +146,7 @@ class IntervalMatcher:
     def reach(self) -> TrackReach | None:
         """How much of the tracks of starts matters; None for all that follows."""
         dynamics = self.scenario.dynamics
-        if asked_of_others(self.scenario) is not None:
+        if properties_of_others(self.scenario) is not None:
             return None
         if dynamics is None:
             return TrackReach(0.0, self.options.gap_s, gaps=True)

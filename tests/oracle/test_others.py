@@ -1,6 +1,6 @@
 """`others`, `count` and `nearest` by plain enumeration, sharing no code: random programs over frames and over time.
 
-Of some label objects the heading, the velocity or the class is not known as far as a program asks for it. What is
+The heading, the velocity or the class of some label objects is not known as far as a program asks for it. What is
 expected follows Kleene's logic; where that leaves something unknown and the tool tells more, fillings must agree.
 """
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.budget import deadline
-from scenicq.forest.among import asked_of_others
+from scenicq.forest.among import properties_of_others
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.unobserved import MOTION
 from scenicq.geometry.network import Network
@@ -73,7 +73,7 @@ class CompiledMap:
         plan = Plan(network.name, (), "", (), None)
         if prefilter:
             plan = make_plan(scenario, network, options, deciding=not proofs, counting=reasons)
-        asked = asked_of_others(scenario)
+        asked = properties_of_others(scenario)
         observed = frozenset[str](asked or ()).union(*relevant_properties(scenario, options))
         return cls(scenario, network, plan, not MOTION.isdisjoint(observed), observed, asked is not None)
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from scenicq.budget import look
 from scenicq.errors import Span
-from scenicq.forest.among import asked_of_others
+from scenicq.forest.among import properties_of_others
 from scenicq.match.matcher import Matcher
 from scenicq.match.problem.constraints import relevant_properties
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown, Verdict, WitnessValue
@@ -154,7 +154,7 @@ class RecordingMatcher:
 
     def __post_init__(self) -> None:
         """Choose what is decided before labels are matched."""
-        self._whole = asked_of_others(self.matcher.scenario) is not None
+        self._whole = properties_of_others(self.matcher.scenario) is not None
         self._necessary = None if self.reasons else NecessaryConditions(self.matcher.scenario)
         outcomes = self.intervals.outcomes
         if len(outcomes) == 1:

@@ -61,7 +61,7 @@ class ResultSummary(Struct, frozen=True, omit_defaults=True, kw_only=True):
         all_matches: Whether every correspondence of a frame is a result; else one of each frame is.
         limit: Matches after which the query was to stop.
         sample: How many matches were drawn, where not all were wanted.
-        sampled_from: Of how many.
+        sampled_from: The number that they were sampled from.
         skipped: Frames that nobody has looked at.
         variables: What the program says at the place of each random variable of its author's, for readers of witnesses.
     """
@@ -159,7 +159,7 @@ class Completeness:
     def why_silent(self, recording: str, timestamp_us: int, frame: str) -> str:
         """Why a frame, or an interval that begins with it, is not named; "" where it does not match.
 
-        Of results that say nothing of themselves it is taken that they are complete.
+        Results that say nothing of themselves are taken to be complete.
         """
         summary = self.summary
         if summary is None:

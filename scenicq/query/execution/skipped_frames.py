@@ -28,7 +28,7 @@ def summarize(query: Query, count: ResultCount) -> ResultSummary:
 
     Args:
         query: After its results were taken.
-        count: Of the results that are there.
+        count: The number of the results that are there.
     """
     funnel, options = query.funnel, query.options
     skipped = tuple(_skipped(query)) if funnel.cut or funnel.limited is not None else ()
@@ -138,7 +138,7 @@ def _consecutive(names: list[str], left: list[str], begun: str) -> Iterator[list
 
     Args:
         names: Of all recordings, sorted.
-        left: Of those, sorted.
+        left: Those that are left, sorted.
         begun: The one of which frames were looked at: it comes first of those that are together.
     """
     number = {name: place for place, name in enumerate(names)}

@@ -72,7 +72,7 @@ def drawn_roles(picture: str) -> dict[str, str]:
 
 
 def test_a_picture_has_the_roles_of_the_interval(run, crossroads, programs):
-    """Of any of its frames, where the initial scene alone may be played by another object."""
+    """It does so for any of its frames, where the initial scene alone may be played by another object."""
     program = programs / "over_time.scenic"
     found = lines_of(run("match", program, crossroads))
     dataset, others = open_dataset(crossroads), 0
