@@ -158,6 +158,7 @@ class HiddenRuns:
         look()
         for each in cast("list[int]", matches[new].tolist()):
             pieces.details[each] = "", _Witness(hidden, pieces, each)
+        look()
         return pieces.some(order[kept[order]]).at(every, np.arange(len(stretches)))
 
     def _confirm(

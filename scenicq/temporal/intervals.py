@@ -199,6 +199,7 @@ class IntervalMatcher:
             expanded = [columns.expanded(condition) for condition in dynamics.conditions]
             look()
             runs = self._dynamic(program, some, columns, expanded, remember)
+            look()
             _tell_budget(runs, some, columns)
             yield some, runs
 

@@ -184,7 +184,7 @@ def stores_of(folder: Path, crossroads: Path) -> Stores:
     draw = random.Random(7)
     traces = [recording_of_trace(f"r{number:02}", random_trace(draw)) for number in range(10)]
     write_dataset(folder / "time", traces, {}, name="traces")
-    around = [LabelObject(f"c{k:02}", "Car", "car", 100.0 + k, 0.0, 0.0) for k in range(74)]
+    around = [LabelObject(f"c{k:02}", "Car", "car", 25.0, 0.1 * k, 0.0) for k in range(74)]  # nearer than the last
     around.append(LabelObject("last", "Car", "car", 5.0, 51.0, 0.0))
     ego = LabelObject("ego", "Car", "car", 5.0, 0.0, 0.0)
     many = Recording("many", "none", (Label("many-0", "many", 0, "none", ego, tuple(around)),))

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from scenicq.errors import DataError
 from scenicq.importers.ingest import ingest
 from scenicq.query.execution.records import json_text
 from scenicq.query.execution.result_files import read_records
@@ -22,11 +23,18 @@ def tables(folder: Path) -> dict[str, bytes]:
     return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*.parquet"))}
 
 
-def test_a_dataset_is_opened_checked_and_what_it_says_kept():
-    dataset = open_dataset(OLDER / "tiny", check=True)
-    dataset.verify()
+def test_a_dataset_is_refused_with_what_brings_it_up_and_what_it_says_is_kept(run, tmp_path):
+    with pytest.raises(DataError, match="`scenicq index"):
+        open_dataset(OLDER / "tiny", check=True)
     said = json.loads((OLDER / "tiny" / "dataset.json").read_text())
-    assert json.loads(dataset.manifest.to_json()) == said
+    older = open_dataset(OLDER / "tiny", older=True, check=False)
+    assert json.loads(older.manifest.to_json()) == said
+    shutil.copytree(OLDER / "tiny", tmp_path / "d")
+    assert run("index", tmp_path / "d").exit_code == 0
+    dataset = open_dataset(tmp_path / "d", check=True)
+    dataset.verify()
+    now = json.loads(dataset.manifest.to_json())
+    assert {name for name in said if now[name] != said[name]} == {"schema", "tables"}
     assert len(list(dataset.labels())) == said["total"]["frames"] == 6
 
 
