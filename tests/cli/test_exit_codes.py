@@ -98,6 +98,7 @@ ENDS: dict[str, tuple[tuple[str, ...], int]] = {
 
 
 @pytest.mark.parametrize("case", ENDS)
+@pytest.mark.one_in(3)
 def test_the_installed_command_ends_as_the_table_says(installed, crossroads, tmp_path, case):
     words, code = ENDS[case]
     program, *rest = (str(crossroads) if each == "DATASET" else each for each in words)

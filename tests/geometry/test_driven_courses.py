@@ -92,6 +92,7 @@ def _compare(samples: list[Sample], network: Network, lanes: Lanes, draw: random
 
 
 @pytest.mark.parametrize("seed", range(3))
+@pytest.mark.one_in(3)
 def test_places_along_random_drives_without_a_map(seed: int) -> None:
     draw, seen = random.Random(seed), Counter[str]()
     for _ in range(20):
@@ -101,6 +102,7 @@ def test_places_along_random_drives_without_a_map(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", range(3))
+@pytest.mark.one_in(3)
 def test_places_along_random_drives_on_lanes(seed: int) -> None:
     draw, seen, network = random.Random(seed), Counter[str](), street()
     lanes = lanes_of(network.features)

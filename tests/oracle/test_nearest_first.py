@@ -181,6 +181,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, La
 
 
 @pytest.mark.parametrize("seed", range(2))
+@pytest.mark.one_in(2)
 def test_every_way_through_a_query_tells_the_same_first(folder, seed, tmp_path):
     dataset, labels = folder
     program = drawn_program(random.Random(100 + seed))
@@ -200,6 +201,7 @@ def test_every_way_through_a_query_tells_the_same_first(folder, seed, tmp_path):
 
 
 @pytest.mark.parametrize("seed", range(3))
+@pytest.mark.one_in(3)
 def test_intervals_come_in_the_same_order(folder, seed, tmp_path):
     dataset, labels = folder
     program = drawn_program(random.Random(200 + seed))

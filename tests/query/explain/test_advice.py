@@ -167,6 +167,7 @@ def test_what_takes_all_time_has_no_more_than_the_budget(until_s, dataset, monke
     assert all(outlook.least < outlook.most for outlook in found.outlooks)
 
 
+@pytest.mark.slow
 def test_labels_that_had_all_their_time_have_none_left_for_advice(dataset, monkeypatch, capsys):
     text = (
         "model scenic.domains.driving.model\nego = new Car\nother = new Car\nrequire (distance to other) < 1\nmutate\n"
