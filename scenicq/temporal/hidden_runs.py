@@ -155,8 +155,9 @@ class HiddenRuns:
         new = (np.diff(pieces.of[matches], prepend=-1) != 0) | (np.diff(pieces.ends[matches], prepend=-1) != 0)
         kept = np.zeros(len(pieces), np.bool_)
         kept[order[firsts]] = kept[matches[new]] = True
-        look()
-        for each in cast("list[int]", matches[new].tolist()):
+        for number, each in enumerate(cast("list[int]", matches[new].tolist())):
+            if not number % 10_000:
+                look()
             pieces.details[each] = "", _Witness(hidden, pieces, each)
         look()
         return pieces.some(order[kept[order]]).at(every, np.arange(len(stretches)))
