@@ -22,7 +22,9 @@ from scenicq.forest.nodes import ELEMENT, RANK, Among, AmongOp, Body, Feature, L
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.walk import postorder
 
-__all__ = ["LABEL_OBJECTS", "LabelElements", "among_column", "asks_others", "joined", "properties_of_others", "taken"]
+__all__ = [
+    "LABEL_OBJECTS", "LabelElements", "among_column", "asks_others", "concatenate", "properties_of_others", "take_rows",
+]  # fmt: skip
 
 _NO, _MAYBE, _YES = np.int8(0), np.int8(1), np.int8(2)
 Truths = NDArray[np.int8]
@@ -66,8 +68,7 @@ def properties_of_others(scenario: Scenario) -> frozenset[str] | None:
     while todo:
         for node in postorder((todo.pop(),)):
             if isinstance(node, Among):
-                body = node.body
-                todo += [each for each in (body.condition, body.distance, body.value) if each is not None]
+                todo += node.body.parts
             elif isinstance(node, Feature) and node.object == ELEMENT:
                 found.add(node.property)
     return frozenset(found)
@@ -123,9 +124,7 @@ def _of_rows(elements: LabelElements, place: NDArray[np.intp], n: int) -> LabelE
     which = np.arange(int(mine.sum())) - np.repeat(ends - mine - firsts[place], mine)
 
     def observed(name: str) -> Column:
-        found = elements.observed(name)
-        whole = len(elements.place)
-        return Column(taken(found.data, which, whole), np.broadcast_to(found.status, whole)[which])
+        return take_rows(elements.observed(name), which, len(elements.place))
 
     return LabelElements(
         np.repeat(np.arange(len(place)), mine), elements.known[place], elements.ids[which],
@@ -151,12 +150,11 @@ def _nearest(
     status[place[first]] = np.where(holds[first] == _YES, DEFINED, UNKNOWN)
     picked = np.zeros(len(elements.known), np.intp)
     picked[place[first]] = first
-    value = found[id(body.value)]
-    own = np.broadcast_to(value.status, len(rows))
     if not len(rows):
         return Column(np.full(1, np.nan), np.maximum(status, unknown))
-    return Column(taken(value.data, picked, len(rows)), np.maximum(np.maximum(status, unknown), np.where(
-        status == DEFINED, own[picked], DEFINED)))  # fmt: skip
+    value = take_rows(found[id(body.value)], picked, len(rows))
+    own = np.where(status == DEFINED, value.status, DEFINED)
+    return Column(value.data, np.maximum(np.maximum(status, unknown), own))
 
 
 def _tally(truths: Truths, place: NDArray[np.intp], n: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -176,14 +174,11 @@ def _read(
 ) -> Column:  # fmt: skip
     """What a feature of a body is in each row."""
     if feature.object == ELEMENT:
-        found = elements.observed(feature.property)
-        return Column(taken(found.data, rows, len(elements.place)), np.broadcast_to(
-            found.status, len(elements.place))[rows])  # fmt: skip
-    found = given[int(feature.property)]
-    return Column(taken(found.data, place, n), np.broadcast_to(found.status, n)[place])
+        return take_rows(elements.observed(feature.property), rows, len(elements.place))
+    return take_rows(given[int(feature.property)], place, n)
 
 
-def joined(columns: Sequence[Column]) -> Column:
+def concatenate(columns: Sequence[Column]) -> Column:
     """Columns of places one after the other, of one kind."""
     lengths = [len(each.status) for each in columns]
     status = np.concatenate([each.status for each in columns])
@@ -202,22 +197,24 @@ def joined(columns: Sequence[Column]) -> Column:
     raise CannotEvaluate("what is asked of the nearest is of several kinds")
 
 
-def taken(data: Data, rows: NDArray[np.intp], n: int) -> Data:
-    """Values at some rows of n."""
+def take_rows(column: Column, rows: NDArray[np.intp], n: int) -> Column:
+    """A column of n rows at some of them."""
 
     def take(values: Array) -> Array:
         return values if values.size == 1 else np.broadcast_to(values, n)[rows]
 
+    data: Data = column.data
     match data:
         case Coded():
-            return Coded(np.broadcast_to(data.which, n)[rows], data.options)
+            data = Coded(np.broadcast_to(data.which, n)[rows], data.options)
         case Placed():
             x, y = data.center
-            return Placed(data.node, (take(x), take(y)), tuple(map(take, data.numbers)))
+            data = Placed(data.node, (take(x), take(y)), tuple(map(take, data.numbers)))
         case (x, y):
-            return take(x), take(y)
+            data = take(x), take(y)
         case _:
-            return take(data)
+            data = take(data)
+    return Column(data, np.broadcast_to(column.status, n)[rows])
 
 
 def _drawn(_leaf: Leaf, _args: Sequence[Column]) -> Column:
@@ -226,4 +223,4 @@ def _drawn(_leaf: Leaf, _args: Sequence[Column]) -> Column:
 
 @lru_cache(maxsize=256)
 def _steps(body: Body) -> Steps:
-    return steps_of(*(each for each in (body.condition, body.distance, body.value) if each is not None))
+    return steps_of(*body.parts)

@@ -23,7 +23,7 @@ from scenicq.geometry.network import Network
 from scenicq.geometry.regions import Region
 
 __all__ = [
-    "COURSE", "ELEMENT", "GIVEN", "IDENTITY", "MIRRORED", "RANK", "TRACK",
+    "COURSE", "ELEMENT", "GIVEN", "IDENTITY", "MIRRORED", "RANK", "TRACK", "WHO",
     "Among", "AmongOp", "Arithmetic", "ArithmeticOp", "Bearing", "Body", "Compare", "CompareOp", "Constant", "Contains",
     "Coordinate", "Corridor", "CourseCoordinate", "DirectionAt", "DiscAt", "DiscreteRange", "Distance", "Encloses",
     "Feature", "Identity", "Index", "Intersects", "Kind", "LaneCourse", "Leaf", "Logic", "LogicOp", "Node", "Norm",
@@ -467,6 +467,8 @@ ELEMENT, GIVEN = -2, -3
 IDENTITY, TRACK, RANK = "#id", "#track", "#rank"
 """Properties of whoever plays an object, as numbers: who it is, where it is observed; who it is, wherever it is; its
 place among the ids of its label."""
+WHO = frozenset({IDENTITY, TRACK, RANK})
+"""All of these: what is known of whoever plays a role, whatever a label observes of it."""
 
 
 class AmongOp(StrEnum):
@@ -493,6 +495,11 @@ class Body:
     condition: Node
     distance: Node | None = None
     value: Node | None = None
+
+    @property
+    def parts(self) -> tuple[Node, ...]:
+        """Those of the three that there are."""
+        return tuple(each for each in (self.condition, self.distance, self.value) if each is not None)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

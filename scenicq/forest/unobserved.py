@@ -37,10 +37,15 @@ from scenicq.forest.value_numbers import ValueNumbers, is_total, without_negatio
 from scenicq.forest.walk import children, postorder, transform
 from scenicq.limits import LIMITS
 
-__all__ = ["MOTION", "certain_and_possible", "with_any_value"]
+__all__ = ["MOTION", "certain_and_possible", "is_open", "with_any_value"]
 
 MOTION = frozenset({"speed", "velocity", "acceleration", "angularSpeed"})
 """Properties that say how an object moves."""
+
+
+def is_open(node: Node, unobserved: Callable[[Feature | Among], bool]) -> bool:
+    """Whether a node is no one value that is known; arguments as of `certain_and_possible`."""
+    return (isinstance(node, Feature | Among) and unobserved(node)) or has_ends(node)
 
 
 def certain_and_possible(root: Node, unobserved: Callable[[Feature | Among], bool]) -> Truths:
@@ -86,10 +91,6 @@ class _Reader:
         self._known: dict[int, int] = {}
         self._alive: list[Node] = []  # as numbers are known by ids
 
-    def _is_open(self, node: Node) -> bool:
-        """Whether a node is no one value that is known."""
-        return (isinstance(node, Feature | Among) and self._unobserved(node)) or has_ends(node)
-
     def _number(self, node: Node) -> int:
         self._alive.append(node)
         return self._numbers.expression(node, known=self._known)
@@ -128,7 +129,7 @@ class _Reader:
         seen: set[int] = set()
         for node in postorder((root,)):
             below = children(node)
-            if self._is_open(node) or any(id(each) in reading for each in below):
+            if is_open(node, self._unobserved) or any(id(each) in reading for each in below):
                 reading.add(id(node))
             if isinstance(node, Logic) and node.op is LogicOp.NOT:
                 continue  # it counts as what it negates, where it is asked for
@@ -170,7 +171,7 @@ class _Reader:
         found: dict[int, Truths] = {}
         for node in postorder((root,)):
             below = children(node)
-            if self._is_open(node) or any(id(each) in reading for each in below):
+            if is_open(node, self._unobserved) or any(id(each) in reading for each in below):
                 reading.add(id(node))
             if kind_of(node) == "boolean" or node is root:
                 reads = id(node) in reading

@@ -76,8 +76,8 @@ class ValueNumbers:
                 case Feature():
                     own = (swap.get(node.object, node.object), node.property, node.current)
                 case Among():
-                    parts = [each for each in (node.body.condition, node.body.distance, node.body.value) if each]
-                    own = (node.op, node.category, node.number, node.excluded, *(self.expression(p) for p in parts))
+                    parts = [self.expression(each) for each in node.body.parts]
+                    own = (node.op, node.category, node.number, node.excluded, *parts)
                     below = [*sorted(below[: node.excluded]), *below[node.excluded :]]
                 case Norm(vector=VectorSum(left, Scale(right, Constant(-1)))):
                     below = sorted((numbers[id(left)], numbers[id(right)]))

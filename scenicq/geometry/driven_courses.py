@@ -286,7 +286,7 @@ def lane_course(network: Network, x: float, y: float, heading: float | None) -> 
         network: The map.
         x: The place.
         y: The place.
-        heading: Of the box; None if it is not known.
+        heading: The box's; None if it is not known.
     """
     numbers = np.array([[x, y, math.nan if heading is None else heading]])
     return track_courses(network, np.zeros(1), numbers, math.inf)[0]

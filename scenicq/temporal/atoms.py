@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.budget import look
-from scenicq.forest.among import LabelElements, among_column, joined, taken
+from scenicq.forest.among import LabelElements, among_column, concatenate, take_rows
 from scenicq.forest.clear_columns import QuickColumns, quick_form
 from scenicq.forest.column_domain import ColumnDomain, first_direction
 from scenicq.forest.columns import DEFINED, UNDEFINED, Coded, Column, arrays_of, column_of, constant_column, truth_of
@@ -347,9 +347,10 @@ class AtomColumns:
             look()
             # those of many samples are not kept
             there = elements or samples.at(np.arange(first, end)).elements()
-            mine = [each if _is_one(each) else _piece(each, first, end, len(samples)) for each in inputs]
+            rows = np.arange(first, end)
+            mine = [each if _is_one(each) else take_rows(each, rows, len(samples)) for each in inputs]
             found.append(among_column(node, mine, there))
-        return found[0] if len(found) == 1 else joined(found)
+        return found[0] if len(found) == 1 else concatenate(found)
 
     def _observed_at(self, node: Feature, samples: NDArray[np.int64]) -> Column:
         """What is observed of a feature at some samples."""
@@ -390,12 +391,6 @@ class AtomColumns:
 def _is_one(column: Column) -> bool:
     """Whether a column has one value for all places."""
     return all(part.size == 1 for part in (*arrays_of(column.data), column.status))
-
-
-def _piece(column: Column, first: int, end: int, n: int) -> Column:
-    """A column of n places at some of them."""
-    rows = np.arange(first, end)
-    return Column(taken(column.data, rows, n), np.broadcast_to(column.status, n)[rows])
 
 
 def _as_truth(found: Column, count: int) -> Truth:

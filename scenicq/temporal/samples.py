@@ -14,15 +14,14 @@ from numpy.typing import NDArray
 from scenicq.forest.among import LabelElements
 from scenicq.forest.columns import DEFINED, UNKNOWN, Column, column_of
 from scenicq.forest.ego_frame import PLACE
-from scenicq.forest.nodes import COURSE, IDENTITY, RANK, TRACK, LaneCourse, Value
+from scenicq.forest.nodes import COURSE, RANK, TRACK, WHO, LaneCourse, Value
 from scenicq.store.classes import Granularity, class_truth
 from scenicq.store.track_block import TrackBlock
 from scenicq.store.tracks import RecordingTracks, TrackKey
 
 __all__ = ["FIXED", "MOVING", "WITH_COLUMNS", "Binding", "BoundSamples", "Observed", "Samples"]
 
-_WHO = frozenset({IDENTITY, TRACK, RANK})
-MOVING = _WHO | {"position", "heading", "velocity", "speed", "angularSpeed", "acceleration", COURSE}
+MOVING = WHO | {"position", "heading", "velocity", "speed", "angularSpeed", "acceleration", COURSE}
 """Properties that change from sample to sample: where they are not observed, nothing is known of them."""
 
 FIXED = frozenset({"width", "length", "height"})
@@ -35,7 +34,7 @@ _COLUMNS = {
     "angularSpeed": "yaw_rate", "acceleration": "acceleration",
 }  # fmt: skip
 
-WITH_COLUMNS = (MOVING - _WHO) | _COLUMNS.keys()
+WITH_COLUMNS = (MOVING - WHO) | _COLUMNS.keys()
 """Properties that the store has columns of."""
 
 Binding = Mapping[int, TrackKey]
@@ -88,7 +87,7 @@ class BoundSamples:
     def observed(self, index: int, name: str) -> tuple[Numbers, ...] | list[Value] | None:
         """See `Observed`."""
         mine = self.members[index]
-        if name in _WHO:
+        if name in WHO:
             who = (self.block.id_ranks() if name == RANK else self.block.tracks(np.arange(self.block.size)))[mine]
             # where it is not there, nobody is it
             return (np.where(mine >= 0, who.astype(np.float64), -1.0 if name == TRACK else np.nan),)

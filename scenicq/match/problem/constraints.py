@@ -13,11 +13,10 @@ from scenicq.forest import build
 from scenicq.forest.among import asks_others
 from scenicq.forest.collisions import apart, boxes
 from scenicq.forest.condition import expand
-from scenicq.forest.course_ends import has_ends
 from scenicq.forest.groups import PARAMS, Comparison, Condition, Constraint, Group, group_constraints
-from scenicq.forest.nodes import COURSE, IDENTITY, RANK, TRACK, Among, Feature, Node
+from scenicq.forest.nodes import COURSE, WHO, Among, Feature, Node
 from scenicq.forest.scenario import BuiltIn, Requirement, Scenario, ScenarioObject
-from scenicq.forest.unobserved import MOTION, certain_and_possible, with_any_value
+from scenicq.forest.unobserved import MOTION, certain_and_possible, is_open, with_any_value
 from scenicq.forest.walk import features, postorder
 from scenicq.match.options import MatchOptions
 
@@ -27,8 +26,6 @@ Signature = tuple[frozenset[str], ...]
 """What is observed of each object of the scenario, by index; of the parameters at the end."""
 
 _ALWAYS = ("position", "heading")
-WHO = frozenset({IDENTITY, TRACK, RANK})
-"""What is known of whoever plays a role, whatever a label observes of it."""
 
 
 def relevant_properties(scenario: Scenario, options: MatchOptions) -> tuple[frozenset[str], ...]:
@@ -119,11 +116,9 @@ def build_groups(scenario: Scenario, signature: Signature, options: MatchOptions
 
 def _with_doubts(group: Group, unobserved: Callable[[Feature | Among], bool]) -> Group:
     """A group whose constraints read only what is known; see `Group.certain`."""
-
-    def is_open(node: Node) -> bool:
-        return (isinstance(node, Feature | Among) and unobserved(node)) or has_ends(node)
-
-    doubtful = [item for item in group.constraints if any(map(is_open, postorder((item.expression,))))]
+    doubtful = [
+        item for item in group.constraints if any(is_open(node, unobserved) for node in postorder((item.expression,)))
+    ]
     if not doubtful:
         return group
     certain, possible = list[Constraint](), list[Constraint]()

@@ -137,7 +137,7 @@ def _consecutive(names: list[str], left: list[str], begun: str) -> Iterator[list
     """Recordings of which frames are left, those together between whose names no other name lies.
 
     Args:
-        names: Of all recordings, sorted.
+        names: The names of all recordings, sorted.
         left: Those that are left, sorted.
         begun: The one of which frames were looked at: it comes first of those that are together.
     """

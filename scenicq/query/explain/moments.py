@@ -46,7 +46,7 @@ def frame_time(name: str, times_us: Sequence[int], moment: int | float) -> int:
     """The timestamp of the frame at a moment: at a timestamp, or nearest to some seconds.
 
     Args:
-        name: Of the recording.
+        name: The recording's.
         times_us: The timestamps of its frames, in order.
         moment: A timestamp in microseconds, or, as a float, the seconds from where the recording begins, to half the
             time between two frames.
