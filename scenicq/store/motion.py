@@ -60,9 +60,12 @@ def motion_of(times_us: NDArray[np.int64], members: MemberColumns, tracks: Seque
     derived = np.isnan(members.vx) & ~np.isnan(x)
     vx, vy = np.where(derived, x, members.vx), np.where(derived, y, members.vy)
     sine, cosine = np.sin(members.heading), np.cos(members.heading)
-    backwards = vy * cosine - vx * sine < 0
-    speed = np.where(np.isnan(members.heading), np.nan, np.hypot(vx, vy) * np.where(backwards, -1.0, 1.0))
-    acceleration = _slopes(times_us, speed, tracks)
+    # speeds near the end of all numbers have no slope that is one
+    with np.errstate(over="ignore", invalid="ignore"):
+        backwards = vy * cosine - vx * sine < 0
+        speed = np.where(np.isnan(members.heading), np.nan, np.hypot(vx, vy) * np.where(backwards, -1.0, 1.0))
+        slopes = _slopes(times_us, speed, tracks)
+    acceleration = np.where(np.isfinite(slopes), slopes, np.nan)
     return MotionColumns(vx, vy, acceleration, steps.rate(members.heading, turns=True), derived)
 
 

@@ -228,3 +228,14 @@ def test_a_derived_speed_is_compared_and_read(tmp_path):
             assert [result.frame for result in found if isinstance(result.verdict, Match)] == frames, lines
             # without headings nothing says how speeds change
             assert ("acceleration" in lines) == any(isinstance(result.verdict, Unknown) for result in found)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_speeds_near_the_end_of_all_numbers_give_finite_accelerations_or_none(seed):
+    """Velocities are what a source says; what a table holds is a number or nothing."""
+    random = np.random.default_rng(seed)
+    sizes = random.choice([1.0, 1e150, 1e300, 1.7e308], size=(40, 2)) * random.choice([-1, 1], size=(40, 2))
+    seen = [[{"x": 0.0, "y": 0.0, "track": "t", "heading": 0.3, "velocity": (vx, vy)}] for vx, vy in sizes.tolist()]
+    found = motion(columns_of(recording(np.arange(40) * 0.25, seen)))
+    assert not np.isinf(found.acceleration).any()
+    assert np.isnan(found.acceleration).any()
