@@ -189,8 +189,8 @@ class Deadly:
 @pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="signals")
 @pytest.mark.parametrize("jobs", [1, 2])
-def test_twenty_kills(source: Path, tmp_path: Path, jobs: int) -> None:
-    kill_often(source, tmp_path, 20, jobs)
+def test_eight_kills(source: Path, tmp_path: Path, jobs: int) -> None:
+    kill_often(source, tmp_path, 8, jobs)
 
 
 def killed(source: Path, target: Path, after: int) -> None:

@@ -83,8 +83,8 @@ def test_a_search_that_takes_too_long_ends_as_unknown() -> None:
 
 @pytest.mark.slow
 def test_verdicts_are_those_of_all_combinations_of_many_programs() -> None:
-    found = [each for seed in range(40, 400) for each in check(seed)]
-    assert len(found) > 800
+    found = [each for seed in range(40, 160) for each in check(seed)]
+    assert len(found) > 260
 
 
 def test_two_cars_on_one_random_lane_are_on_one() -> None:
