@@ -12,7 +12,8 @@ from scenicq.query.execution.run import Query
 from .report import columns, count, plain
 
 if TYPE_CHECKING:  # takes long to load
-    from scenicq.query.explain.advice import Outlook, ProgramChange
+    from scenicq.query.explain.advice import Outlook
+    from scenicq.query.explain.changes import Change
 
 __all__ = ["advise", "is_nearly_empty"]
 
@@ -61,7 +62,7 @@ def advise(query: Query, *, asked: bool, near: bool = False) -> None:
         two = bool(found.outlooks[0].change.both)
         lines.append(f"{none}; with two there would be:" if two else "with one change there would be:")
         shown = found.outlooks if asked else found.outlooks[:_LINES]
-        rows = [(_number(each), each.change.told, _place(each.change)) for each in shown]
+        rows = [(_number(each), each.change.text, _place(each.change)) for each in shown]
         lines += columns(list(dict.fromkeys(rows)), right=frozenset({0}))
     else:
         lines.append(none)
@@ -73,10 +74,10 @@ def advise(query: Query, *, asked: bool, near: bool = False) -> None:
     click.echo("\n".join(lines), err=True)
 
 
-def _place(change: ProgramChange) -> str:
+def _place(change: Change) -> str:
     """The lines that a change concerns, and what to write there."""
     told: list[str] = []
-    for each in change.both or (change,):
+    for each in change.parts:
         span = each.span
         if span is not None and not (span.source.name.startswith("<") and span.source.name.endswith(".scenic>")):
             line = f"line {span.source.position(span.start)[0]}"

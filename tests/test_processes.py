@@ -151,6 +151,7 @@ def test_a_start_that_fails_is_no_endless_loop():
         list(workers.run([1]))
 
 
+@pytest.mark.slow
 def test_starting_processes_may_be_killed_now_and_then(monkeypatch, tmp_path):
     monkeypatch.setattr("scenicq.processes._serve", killed_at_the_start)
     monkeypatch.setattr("scenicq.processes._KILLED_STARTS", 6)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import TYPE_CHECKING, cast
 
 from scenicq.compiler import operators
@@ -74,7 +75,7 @@ def count(run: Interpreter, span: Span, *args: ModelValue, **named: ModelValue) 
     if args and isinstance(args[0], OtherList) and len(args) == 1 and not named:
         return how_many(args[0], span)
     cls = _class(run, span, "count", args, named, _FILTERS)
-    every = _all_of(run, cls, span)
+    every = __all_of(run, cls, span)
     element = _element(every, span)
     return _among(AmongOp.COUNT, every, element, _counting(named, span)(element), span)
 
@@ -82,7 +83,7 @@ def count(run: Interpreter, span: Span, *args: ModelValue, **named: ModelValue) 
 def nearest(run: Interpreter, span: Span, *args: ModelValue, **named: ModelValue) -> ModelValue:
     """`nearest(C, within=R)`."""
     cls = _class(run, span, "nearest", args, named, _FILTERS)
-    every, counts, ego = _all_of(run, cls, span), _counting(named, span), run.ego(span)
+    every, counts, ego = __all_of(run, cls, span), _counting(named, span), run.ego(span)
     made = Nearest(cls, None, span, objects=every, counts=counts, ego=ego)
     element = _element(every, span)
     away = operators.distance_to(element, ego, span)
@@ -108,14 +109,24 @@ def is_nearest(one: Instance, other: Nearest, span: Span) -> Node:
     before = build.logic(
         LogicOp.OR,
         _compare("<", away, least, span),
-        _both((_compare("==", away, least, span), ranks), span),
+        _all_of((_compare("==", away, least, span), ranks), span=span),
         span=span,
     )
-    is_there = _among(AmongOp.AT_LEAST, objects, element, _both((same, counts), span), span)
-    someone = _among(AmongOp.AT_LEAST, objects, element, _both((build.opposite(same), counts, before), span), span)
+    is_there = _among(AmongOp.AT_LEAST, objects, element, _all_of((same, counts), span=span), span)
+    someone = _among(
+        AmongOp.AT_LEAST,
+        objects,
+        element,
+        _all_of((build.opposite(same), counts, before), span=span),
+        span,
+    )
     # where it is not seen, nothing is known of it, also where nobody is
     seen = Compare(CompareOp.EQ, _who(one, IDENTITY, span), _who(one, IDENTITY, span), span=span)
-    return Select(seen, (build.constant(False), _both((is_there, build.opposite(someone)), span)), span=span)
+    return Select(
+        seen,
+        (build.constant(False), _all_of((is_there, build.opposite(someone)), span=span)),
+        span=span,
+    )
 
 
 def list_elements(
@@ -148,10 +159,10 @@ def truth_of_list(op: str, items: OtherList, span: Span) -> Node:
     """`any` ("or") or `all` ("and") of a list."""
     wanted = to_boolean(items.value, span)
     if op == "or":
-        body = _both((*items.conditions, wanted), span)
+        body = _all_of((*items.conditions, wanted), span=span)
         return _among(AmongOp.AT_LEAST, items.objects, items.element, body, span)
     if items.conditions:
-        left_out = build.opposite(_both(items.conditions, span))
+        left_out = build.opposite(_all_of(items.conditions, span))
         wanted = build.logic(LogicOp.OR, left_out, wanted, span=span)
     return _among(AmongOp.EVERY, items.objects, items.element, wanted, span)
 
@@ -160,7 +171,7 @@ def how_many(items: OtherList | LabelObjects, span: Span) -> Node:
     """`len` of a list, or of all others."""
     if isinstance(items, LabelObjects):
         return _among(AmongOp.COUNT, items, _element(items, span), build.constant(True), span)
-    return _among(AmongOp.COUNT, items.objects, items.element, _both(items.conditions, span), span)
+    return _among(AmongOp.COUNT, items.objects, items.element, _all_of(items.conditions, span), span)
 
 
 _FILTERS = ("within",)
@@ -186,7 +197,7 @@ def _class(
     return args[0]
 
 
-def _all_of(run: Interpreter, cls: ScenicClass, span: Span) -> LabelObjects:
+def __all_of(run: Interpreter, cls: ScenicClass, span: Span) -> LabelObjects:
     """All of a class but the ego."""
     return LabelObjects(cls, (_who(run.ego(span), TRACK, span),))
 
@@ -205,11 +216,8 @@ def _counting(named: Mapping[str, ModelValue], span: Span) -> Callable[[Instance
     return counts
 
 
-def _both(conditions: tuple[Node, ...], span: Span) -> Node:
-    conditions = tuple(each for each in conditions if not (isinstance(each, Constant) and each.value is True))
-    if not conditions:
-        return build.constant(True)
-    return conditions[0] if len(conditions) == 1 else build.logic(LogicOp.AND, *conditions, span=span)
+_all_of = partial(build.connect, LogicOp.AND)
+"""Conditions together."""
 
 
 def _compare(op: str, left: Node, right: Node, span: Span) -> Node:

@@ -7,6 +7,7 @@ so on.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 from scenicq.errors import Span
@@ -129,6 +130,15 @@ def _count_against(many: Among, op: CompareOp, number: float, span: Span | None)
 def logic(op: LogicOp, *args: Node, span: Span | None = None) -> Node:
     """A connective."""
     return fold(Logic(op, args, span=span))
+
+
+def connect(op: LogicOp, args: Sequence[Node], span: Span | None = None) -> Node:
+    """`and` or `or` of conditions, without those that are known."""
+    decisive = op is LogicOp.OR
+    if any(isinstance(each, Constant) and each.value is decisive for each in args):
+        return constant(decisive)
+    left = [each for each in args if not (isinstance(each, Constant) and each.value is not decisive)]
+    return logic(op, *left, span=span) if len(left) > 1 else left[0] if left else constant(not decisive)
 
 
 def vector(x: Node, y: Node, span: Span | None = None) -> Node:

@@ -25,7 +25,7 @@ from scenicq.forest.nodes import (
 )
 from scenicq.forest.walk import children, postorder, transform
 
-__all__ = ["Truths", "connect", "has_ends", "join", "opposite", "truths_by_ends"]
+__all__ = ["Truths", "has_ends", "join", "opposite", "truths_by_ends"]
 
 Truths = tuple[Node, Node]
 """A condition that holds only where another surely holds, and one that holds wherever that may hold."""
@@ -39,20 +39,7 @@ def opposite(truths: Truths) -> Truths:
 
 def join(op: LogicOp, *args: Truths) -> Truths:
     """`and` or `or`; what is known of the operands decides it where that is enough."""
-    return connect(op, [certain for certain, _ in args]), connect(op, [possible for _, possible in args])
-
-
-def connect(op: LogicOp, args: list[Node]) -> Node:
-    """`and` or `or` of conditions, without those that are known."""
-    decisive = op is LogicOp.OR
-    if any(_is(arg, decisive) for arg in args):
-        return build.constant(decisive)
-    left = [arg for arg in args if not _is(arg, not decisive)]
-    return build.logic(op, *left) if len(left) > 1 else left[0] if left else build.constant(not decisive)
-
-
-def _is(node: Node, value: bool) -> bool:
-    return isinstance(node, Constant) and node.value is value
+    return build.connect(op, [certain for certain, _ in args]), build.connect(op, [possible for _, possible in args])
 
 
 def has_ends(node: Node) -> bool:
@@ -71,7 +58,7 @@ def truths_by_ends(node: Node) -> Truths:
     exact = [build.compare(CompareOp.LE, replace(each, end=1), lower[id(each)], node.span) for each in numbers]
     same = transform(node, lambda each: lower.get(id(each), each))
     inexact = [build.opposite(each) for each in exact]
-    return connect(LogicOp.AND, [*exact, same]), connect(LogicOp.OR, [*inexact, same])
+    return build.connect(LogicOp.AND, [*exact, same]), build.connect(LogicOp.OR, [*inexact, same])
 
 
 def _compared(node: Compare, left: Truths, right: Truths) -> Truths:

@@ -15,7 +15,7 @@ from dataclasses import replace
 
 from scenicq.errors import Span
 from scenicq.forest import build
-from scenicq.forest.course_ends import Truths, connect, has_ends, join, opposite, truths_by_ends
+from scenicq.forest.course_ends import Truths, has_ends, join, opposite, truths_by_ends
 from scenicq.forest.kinds import kind_of
 from scenicq.forest.nodes import (
     MIRRORED,
@@ -115,11 +115,11 @@ class _Reader:
 
             cases.append(self.apart(transform(root, given), splits - 1))
         (sure, may), (sure_not, may_not) = cases
-        either = connect(LogicOp.AND, [
-            connect(LogicOp.OR, [build.opposite(possible), sure]), connect(LogicOp.OR, [certain, sure_not]),
+        either = build.connect(LogicOp.AND, [
+            build.connect(LogicOp.OR, [build.opposite(possible), sure]), build.connect(LogicOp.OR, [certain, sure_not]),
         ])  # fmt: skip
-        some = connect(LogicOp.OR, [
-            connect(LogicOp.AND, [possible, may]), connect(LogicOp.AND, [build.opposite(certain), may_not]),
+        some = build.connect(LogicOp.OR, [
+            build.connect(LogicOp.AND, [possible, may]), build.connect(LogicOp.AND, [build.opposite(certain), may_not]),
         ])  # fmt: skip
         return either, some
 

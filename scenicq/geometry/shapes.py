@@ -163,12 +163,14 @@ def covers_many(a: NDArray[Any], b: NDArray[Any]) -> NDArray[np.bool_]:
 
 def _overlay(operation: Callable[..., Any], *operands: Any, exact: bool = True) -> Any:
     """The result of an operation on areas; on a grid where GEOS cannot tell how edges cross, ever coarser."""
-    for grid in _GRIDS[not exact :]:
-        try:
-            return operation(*operands, grid_size=grid)
-        except shapely.GEOSException:
-            continue
-    return operation(*map(_repaired, operands), grid_size=_GRIDS[-1])
+    # coordinates near the end of all numbers overflow
+    with np.errstate(all="ignore"):
+        for grid in _GRIDS[not exact :]:
+            try:
+                return operation(*operands, grid_size=grid)
+            except shapely.GEOSException:
+                continue
+        return operation(*map(_repaired, operands), grid_size=_GRIDS[-1])
 
 
 def _repaired(shape: Any) -> Any:

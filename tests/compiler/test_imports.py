@@ -116,9 +116,9 @@ def _compare(programs: list[Files], folder: Path) -> tuple[int, int]:
 
 
 def test_random_trees_of_files_mean_what_they_mean_in_python(tmp_path: Path) -> None:
-    right, wrong = _compare([_drawn(seed) for seed in range(150)], tmp_path)
-    assert right >= 40
-    assert wrong >= 40
+    right, wrong = _compare([_drawn(seed) for seed in range(60)], tmp_path)
+    assert right >= 15
+    assert wrong >= 15
 
 
 _PROGRAMS: dict[str, tuple[str, Files]] = {

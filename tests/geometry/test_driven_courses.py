@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import random
 from collections import Counter
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -103,9 +104,9 @@ def test_places_along_random_drives_without_a_map(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.one_in(3)
-def test_places_along_random_drives_on_lanes(seed: int) -> None:
+def test_places_along_random_drives_on_lanes(seed: int, rounds: Callable[[int], int]) -> None:
     draw, seen, network = random.Random(seed), Counter[str](), street()
     lanes = lanes_of(network.features)
-    for _ in range(20):
+    for _ in range(rounds(40)):
         _compare(_track_on_lanes(draw, lanes), network, lanes, draw, seen)
     assert seen["one"] > 5 * seen["several"]

@@ -88,6 +88,7 @@ def test_every_field_of_a_label(tmp_path, monkeypatch, columnar, alone, rounds):
     assert max(len(each.message) for each in summary.diagnostics) < 6000
 
 
+@pytest.mark.slow
 def test_every_property_of_a_map(tmp_path):
     source = Path(shutil.copytree(SOURCE, tmp_path / "source"))
     file = source / "maps" / "crossroads.geojson"

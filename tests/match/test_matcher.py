@@ -346,7 +346,13 @@ HERE = str(Path(__file__).parent)
 
 @pytest.mark.usefixtures("no_search")
 @pytest.mark.parametrize(
-    ("kind", "reason"), [("hang", "timeout"), ("garble", "garbage"), ("eat", "memory"), ("die", "crash")]
+    ("kind", "reason"),
+    [
+        pytest.param("hang", "timeout", marks=pytest.mark.slow),
+        ("garble", "garbage"),
+        ("eat", "memory"),
+        ("die", "crash"),
+    ],
 )
 def test_a_solver_that_misbehaves_harms_its_own_frames_only(kind, reason, monkeypatch):
     monkeypatch.syspath_prepend(HERE)

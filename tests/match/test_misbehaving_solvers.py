@@ -65,6 +65,7 @@ def honest(verdicts):
     return found
 
 
+@pytest.mark.slow
 def test_frames_that_a_broken_solver_decides_are_as_ever_and_the_others_are_named(honest, verdicts, monkeypatch):
     monkeypatch.syspath_prepend(str(HERE))
     monkeypatch.setattr(solver, "DREAL", "mixed_checks:check")

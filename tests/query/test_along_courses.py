@@ -295,6 +295,6 @@ def test_advice_counts_by_the_courses_of_tracks(drawn: Drawn) -> None:
     text = f"{HEAD}require along(ego, c) > 3\nrequire (distance to c) < -1\n"
     query = Query(drawn.dataset, Source("p.scenic", text), QueryOptions())
     assert not [each for each in query.results() if isinstance(each.verdict, Match)]
-    without = next(each for each in advice(query).outlooks if "distance" in each.change.told)
+    without = next(each for each in advice(query).outlooks if "distance" in each.change.text)
     left = _found(drawn.dataset, f"{HEAD}require along(ego, c) > 3\n")
     assert without.least == sum(1 for truth in left.values() if truth)

@@ -106,7 +106,7 @@ def run(tmp_path: Path, seed: int, programs: int) -> None:
 
 
 def test_random_programs_give_the_intervals_of_the_definition(tmp_path):
-    run(tmp_path, 1, 10)
+    run(tmp_path, 1, 6)
 
 
 @pytest.mark.slow

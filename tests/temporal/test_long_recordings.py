@@ -34,12 +34,12 @@ def _trace(draw):
 
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.one_in(3)
-def test_the_prefilter_changes_nothing(tmp_path, seed):
+def test_the_prefilter_changes_nothing(tmp_path, seed, rounds):
     draw = random.Random(seed)
     traces = {f"r{number}": _trace(draw) for number in range(2)}
     write_dataset(tmp_path / "d", [recording_of(*each) for each in traces.items()], {}, name="d")
     total = 0
-    for round_ in range(8):
+    for round_ in range(rounds(16)):
         program = random_program(draw)
         while program.start is None or program.monitors:
             program = random_program(draw)
@@ -54,4 +54,4 @@ def test_the_prefilter_changes_nothing(tmp_path, seed):
         )
         assert with_it == without, program.text()
         total += len(with_it)
-    assert total > 50
+    assert total > rounds(100)

@@ -67,9 +67,9 @@ def with_gaps(draw, trace, most):
     return shown, completions
 
 
-def test_agrees_with_the_recursive_definition():
+def test_agrees_with_the_recursive_definition(rounds):
     draw = random.Random(7)
-    for _ in range(2_000):
+    for _ in range(rounds(4_000)):
         formula, trace = random_formula(draw, 4), random_trace(draw, 6)
         found = values_of(formula, [[2 * value for value in sample] for sample in trace])
         assert found == [2 * recursive(formula, trace, k) for k in range(len(trace))]

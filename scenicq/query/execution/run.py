@@ -275,17 +275,17 @@ class Query:
             raise ScenarioError([replace(each, severity="error") for each in found.warnings])
         return found
 
-    def alone(self, recording: str, map_name: str, compiled: CompiledMap, match: MatchOptions) -> Query:
-        """This query of one recording, in this process, with another scenario or other options of the matcher.
+    def alone(self, recording: str, map_name: str, compiled: CompiledMap, options: QueryOptions) -> Query:
+        """This query of one recording, in this process, with another scenario or other options.
 
         Args:
             recording: Its name.
             map_name: The map that it is on.
             compiled: The scenario over that map, with its prefilter.
-            match: The options.
+            options: The options.
         """
         known = replace(self._known, compiled={**self._known.compiled, map_name: compiled})
-        options = replace(self.options, match=match, jobs=1, limit=None, every=False)
+        options = replace(options, jobs=1, limit=None, every=False)
         chosen = {map_name: RecordingRange(recording, recording, self.dataset.manifest.by_recording[recording].frames)}
         return Query(self.dataset, self.source, options, chosen, files=self.files, _known=known)
 

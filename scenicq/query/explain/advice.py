@@ -14,13 +14,13 @@ import re
 from collections.abc import Iterator, Mapping, Sequence, Set
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import islice
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from scenicq.budget import limited, time_is_up, time_left_s
-from scenicq.errors import Span
 from scenicq.forest.kinds import kind_of
 from scenicq.forest.scenario import Scenario
 from scenicq.limits import LIMITS
@@ -30,8 +30,17 @@ from scenicq.match.tolerance import Tolerance
 from scenicq.match.verdict import Match, Unknown
 from scenicq.query.execution.block_matcher import CompiledMap
 from scenicq.query.execution.lazy_solver import LazySolver
-from scenicq.query.execution.run import MAP_LACKS, Query
-from scenicq.query.explain.nearest_miss import show_tolerance
+from scenicq.query.execution.run import MAP_LACKS, Query, QueryOptions
+from scenicq.query.explain.changes import (
+    Change,
+    as_class,
+    ignoring,
+    show_tolerance,
+    together,
+    tolerating,
+    uncompared,
+    without_requirement,
+)
 from scenicq.query.explain.prefilter_counts import spots
 from scenicq.query.prefilter.executor import hold, run_plan
 from scenicq.query.prefilter.survivors import candidates
@@ -41,7 +50,7 @@ from scenicq.store.recorded_tracks import RecordedTracks
 if TYPE_CHECKING:
     import duckdb
 
-__all__ = ["Advice", "Outlook", "ProgramChange", "advice"]
+__all__ = ["Advice", "Outlook", "advice"]
 
 _ANYWHERE = {"position": 1e5, "heading": math.pi}
 """Sizes of a tolerance by which a feature is as good as not compared."""
@@ -61,38 +70,6 @@ _WIDER_NUMBER = 0.5
 
 
 @dataclass(frozen=True, slots=True)
-class ProgramChange:
-    """A change of the program or the options.
-
-    Attributes:
-        told: The change, in the words of the program and of the options.
-        about: What it changes, as the funnel names what excludes frames; a property where it concerns many objects.
-        span: The place in the program.
-        requirement: Place of the requirement that is dropped among the scenario's; -1 where none is.
-        unset: Object and property that are not compared.
-        category: Object and the class that it is given.
-        tolerance: The tolerance, where it is another one.
-        ignored: A parameter that is not compared.
-        written: What to write for it, where the change is one of words.
-        both: The two changes that this one is, if it is two.
-        widened: Place among the tolerances that are tried one after the other for the same property; 0 for what drops
-            something.
-    """
-
-    told: str
-    about: str
-    span: Span | None = None
-    requirement: int = -1
-    unset: tuple[int, str] | None = None
-    category: tuple[int, str] | None = None
-    tolerance: Tolerance | None = None
-    ignored: str = ""
-    written: str = ""
-    both: tuple[ProgramChange, ...] = ()
-    widened: int = 0
-
-
-@dataclass(frozen=True, slots=True)
 class Outlook:
     """How many frames there would be with a change.
 
@@ -103,7 +80,7 @@ class Outlook:
         sampled: Whether the numbers were projected from a sample.
     """
 
-    change: ProgramChange
+    change: Change
     least: int
     most: int
     sampled: bool
@@ -172,11 +149,12 @@ def advice(query: Query, *, budget_s: float = math.inf, brief: bool = False) -> 
         # a wider tolerance is tried after the first feature that it concerns
         rank.setdefault(what.rpartition(".")[2], rank[what])
     changes = sorted(
-        _changes(scenario, query.options.match), key=lambda each: (rank.get(each.about, len(excluded)), each.widened)
+        _changes(scenario, query.options.match), key=lambda each: (rank.get(each.about, len(excluded)), each.rung)
     )
     few, decided = (
         (LIMITS.brief_changes, LIMITS.brief_decisions) if brief else (LIMITS.advice_changes, LIMITS.advice_decisions)
     )
+    options = replace(query.options, prefilter=True)
     found: list[Outlook] = []
     complete = True
     with ExitStack() as stack, limited(min(budget_s, time_left_s(query.options.until))):
@@ -187,17 +165,17 @@ def advice(query: Query, *, budget_s: float = math.inf, brief: bool = False) -> 
             if number and (time_is_up() or number >= (few if found else LIMITS.advice_changes)):
                 complete = False
                 break
-            outlook = _outlook(query.options.match, sample, change, solver, decided)
+            outlook = _outlook(options, sample, change, solver, decided)
             if outlook.most > query.funnel.matches:
                 found.append(outlook)
         if not found and query.funnel.matches == 0:
             paired = _pairs(changes, LIMITS.brief_pairs if brief else LIMITS.advice_pairs)
             for change in itertools.takewhile(lambda _: not time_is_up(), paired):
-                outlook = _outlook(query.options.match, sample, change, solver, decided)
+                outlook = _outlook(options, sample, change, solver, decided)
                 if outlook.most > 0:
                     found.append(outlook)
     found.sort(key=lambda each: (-each.least, -each.most))
-    changed = {each.about for outlook in found for each in (outlook.change.both or (outlook.change,))}
+    changed = {each.about for outlook in found for each in outlook.change.parts}
     doubtful = rank.keys() | changed if found else {f"{owner.name}.position" for owner in scenario.objects}
     hints = (*_lines_meant(scenario, doubtful), *_without_maps(query))
     return Advice(tuple(excluded[:3]), tuple(found), complete, hints, without_map)
@@ -222,11 +200,10 @@ def _lines_meant(scenario: Scenario, about: Set[str]) -> Iterator[str]:
                    f"`at {other} offset by {_AREAS[side]}` is an area")  # fmt: skip
 
 
-def _pairs(changes: Sequence[ProgramChange], most: int) -> Iterator[ProgramChange]:
+def _pairs(changes: Sequence[Change], most: int) -> Iterator[Change]:
     """Two changes at once, of the first that drop something."""
-    dropping = [each for each in changes if not each.widened]
-    for one, other in itertools.combinations(dropping[:most], 2):
-        yield ProgramChange(f"{one.told}, and {other.told}", one.about, both=(one, other))
+    dropping = [each for each in changes if not each.rung]
+    return itertools.starmap(together, itertools.combinations(dropping[:most], 2))
 
 
 def _sample(query: Query, worlds: Mapping[str, CompiledMap], stack: ExitStack, runs: int, maps: int) -> _Sample:
@@ -244,9 +221,10 @@ def _sample(query: Query, worlds: Mapping[str, CompiledMap], stack: ExitStack, r
     return _Sample(chosen, held, frames, total, query.dataset.recorded)
 
 
-def _changes(scenario: Scenario, options: MatchOptions) -> Iterator[ProgramChange]:
+def _changes(scenario: Scenario, options: MatchOptions) -> Iterator[Change]:
     """The changes that a program and its options can make, those of its features and requirements in its order."""
-    for number, requirement in enumerate(scenario.requirements):
+    dropped: dict[str, Change] = {}
+    for requirement in scenario.requirements:
         if requirement.built_in is None or requirement.built_in in options.enforce:
             text = " ".join(requirement.span.text.split()) if requirement.span is not None else "a requirement"
             if requirement.built_in is not None:
@@ -254,83 +232,55 @@ def _changes(scenario: Scenario, options: MatchOptions) -> Iterator[ProgramChang
                 text = f"{requirement.built_in.value} of {names}"
             elif _ATTRIBUTE.fullmatch(text):
                 continue  # no statement says that `ego.lane` must be there, so that none can be dropped
-            yield ProgramChange(f"without `{text}`", text, requirement.span, requirement=number)
+            dropped.setdefault(f"{text} {requirement.span and requirement.span.start}",
+                               without_requirement(requirement, text))  # fmt: skip
+    yield from dropped.values()
     for name, given in scenario.params.items():
         if given.explicit and name not in options.ignore_params:
-            yield ProgramChange(f"--ignore-params {name}", f"param {name}", given.span, ignored=name)
+            yield ignoring(name, given.span)
     numbers: dict[str, None] = {}
     for owner in scenario.objects:
         for name, given in owner.properties.items():
-            what = f"{owner.name}.{name}"
             if name in _ANYWHERE and name not in owner.mutated:
-                rules = (*options.tolerance.rules, (owner.name, name, _ANYWHERE[name]))
-                wide = replace(options.tolerance, rules=rules)
+                what = f"{owner.name}.{name}"
                 span, written = (given.span, "") if given.explicit else (owner.span, _WRITTEN[name])
-                yield ProgramChange(f"`{what}` not compared", what, span, tolerance=wide, written=written)
+                wide = partial(_ruled, owner.name, name, _ANYWHERE[name])
+                yield tolerating(f"`{what}` not compared", wide, about=what, span=span, written=written)
             elif given.explicit and name not in _ANYWHERE:
-                yield ProgramChange(f"`{what}` not compared", what, given.span, unset=(owner.index, name))
+                yield uncompared(scenario, owner.index, name)
                 if kind_of(given.value) == "scalar":
                     numbers[name] = None
         wider = ancestors(owner.category)[1:2] if is_class(owner.category) else ()
-        for category in wider:
-            told = f"`{owner.name}` as `{category}`"
-            yield ProgramChange(told, f"{owner.name}.class", owner.span, category=(owner.index, category))
-    for name in numbers:
-        if options.tolerance.of(0, name).size < _WIDER_NUMBER:
-            wide = replace(options.tolerance, rules=(*options.tolerance.rules, ("", name, _WIDER_NUMBER)))
-            yield ProgramChange(f"--tolerance {show_tolerance(wide)}", name, tolerance=wide, widened=1)
+        yield from (as_class(scenario, owner.index, category) for category in wider)
+    wider_parts = [(name, partial(_ruled, "", name, _WIDER_NUMBER), 1) for name in numbers
+                   if options.tolerance.of(0, name).size < _WIDER_NUMBER]  # fmt: skip
     for number, (name, size) in enumerate(_WIDER, 1):
         disc = name != "position" or options.tolerance.x is None
         if disc and getattr(options.tolerance, name) < size:
-            wide = (
-                replace(options.tolerance, position=size)
-                if name == "position"
-                else replace(options.tolerance, heading=size)
-            )
-            yield ProgramChange(f"--tolerance {show_tolerance(wide)}", name, tolerance=wide, widened=number)
+            wider_parts.append((name, partial(_sized, name, size), number))
+    for name, wide, rung in wider_parts:
+        yield tolerating(f"--tolerance {show_tolerance(wide(options.tolerance))}", wide, about=name, rung=rung)
 
 
-def _changed(scenario: Scenario, changes: Sequence[ProgramChange]) -> Scenario:
-    objects = list(scenario.objects)
-    dropped = {change.requirement for change in changes}
-    requirements = [each for number, each in enumerate(scenario.requirements) if number not in dropped]
-    for change in changes:
-        if change.unset is not None:
-            index, name = change.unset
-            given = objects[index].properties[name]
-            properties = {**objects[index].properties, name: replace(given, explicit=False)}
-            objects[index] = replace(objects[index], properties=properties)
-        if change.category is not None:
-            index, category = change.category
-            objects[index] = replace(objects[index], category=category)
-    return replace(scenario, requirements=tuple(requirements), objects=tuple(objects))
+def _ruled(scope: str, name: str, size: float, tolerance: Tolerance) -> Tolerance:
+    return replace(tolerance, rules=(*tolerance.rules, (scope, name, size)))
 
 
-def _changed_options(options: MatchOptions, changes: Sequence[ProgramChange]) -> MatchOptions:
-    before = len(options.tolerance.rules)
-    for change in changes:
-        if change.tolerance is not None:
-            rules = (*options.tolerance.rules, *change.tolerance.rules[before:])
-            options = replace(options, tolerance=replace(change.tolerance, rules=rules))
-        if change.ignored:
-            options = replace(options, ignore_params=options.ignore_params | {change.ignored})
-    return options
+def _sized(name: str, size: float, tolerance: Tolerance) -> Tolerance:
+    return replace(tolerance, position=size) if name == "position" else replace(tolerance, heading=size)
 
 
-def _outlook(options: MatchOptions, sample: _Sample, change: ProgramChange, solver: LazySolver, most: int) -> Outlook:
+def _outlook(options: QueryOptions, sample: _Sample, change: Change, solver: LazySolver, most: int) -> Outlook:
     """Count the frames that a change leaves, and decide at most so many of them while there is time."""
-    changes = change.both or (change,)
-    options = _changed_options(options, changes)
     left = matched = decided = looked_at = 0
     for name, connection in sample.held.items():
-        world = sample.worlds[name]
-        world = CompiledMap.of(_changed(world.scenario, changes), world.network, options, prefilter=True)
+        world, changed = change.compiled(sample.worlds[name], options)
         missed = run_plan(connection, world.plan)
         count = int(np.count_nonzero(missed < 0))
         left += count
         if not count or looked_at >= most or time_is_up():
             continue
-        matcher = Matcher(world.scenario, options, solver)
+        matcher = Matcher(world.scenario, changed.match, solver)
         left_over = candidates(connection, world.plan, motion=world.motion, recorded=sample.recorded, whole=world.whole)
         labels = islice(left_over, most - looked_at)
         for verdict in matcher.match_all([(each.label, each.among) for each in labels]):

@@ -25,8 +25,9 @@ from scenicq.match.explanation import (
 )
 from scenicq.match.matcher import Matcher
 from scenicq.match.verdict import Match, NoMatch, Unknown, Verdict, WitnessValue
+from scenicq.query.explain.changes import show_tolerance
 from scenicq.query.explain.margins import SatisfiedConstraint, margins
-from scenicq.query.explain.nearest_miss import Closest, closest, separated, show_tolerance
+from scenicq.query.explain.nearest_miss import Closest, closest, separated
 from scenicq.query.explain.violations import Violation, violations
 from scenicq.smt.encode import UnsupportedError
 from scenicq.smt.smtlib import to_smtlib

@@ -22,7 +22,7 @@ from scenicq.temporal.atoms import AtomColumns, UnclearVariable
 from scenicq.temporal.formula_values import FormulaValues
 from scenicq.temporal.truth import TRUE, Truth
 
-__all__ = ["Change", "least_changes"]
+__all__ = ["Shift", "least_changes"]
 
 _GREATER = (CompareOp.GT, CompareOp.GE)
 _ORDERS = (*_GREATER, CompareOp.LT, CompareOp.LE)
@@ -31,7 +31,7 @@ _SPARE = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class Shift:
     """A comparison that would do with another number.
 
     Attributes:
@@ -64,7 +64,7 @@ class Change:
 def least_changes(
     columns: AtomColumns, formula: Formula, conditions: Sequence[Node], *, ends: bool = False, goes_on: bool = False,
     quick: bool = False,
-) -> Iterator[Change]:  # fmt: skip
+) -> Iterator[Shift]:  # fmt: skip
     """For each comparison in a formula that does not hold the least change of it alone that makes it hold.
 
     Args:
@@ -112,7 +112,7 @@ def _comparisons(condition: Node) -> list[Compare]:
 def _least(
     columns: AtomColumns, formula: FormulaValues, known: Mapping[int, Truth], number: int, condition: Node,
     compare: Compare, *, goes_on: bool, quick: bool,
-) -> Change | None:  # fmt: skip
+) -> Shift | None:  # fmt: skip
     """The least change of one comparison that makes a formula hold; None if there is none."""
     sides = [columns.number(columns.expanded(side)) for side in (compare.left, compare.right)]
     left, right = sides
@@ -147,8 +147,8 @@ def _least(
         if len(values) and not set(features(side)):
             more = (compare.op in _GREATER) == (side is compare.left)
             old = float(values[0])
-            return Change(what, enough, compare, old + enough if more else old - enough, old)
-    return Change(what, enough, compare)
+            return Shift(what, enough, compare, old + enough if more else old - enough, old)
+    return Shift(what, enough, compare)
 
 
 def _first(amounts: NDArray[np.float64], holds: Callable[[float], bool]) -> float | None:

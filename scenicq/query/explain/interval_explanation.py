@@ -19,8 +19,9 @@ from scenicq.query.execution.recording_starts import DecidedStart, few_findings,
 from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query
 from scenicq.query.explain.bands import Band, bands_of, columns_of, show_bands
+from scenicq.query.explain.changes import longest_with, shifted
 from scenicq.query.explain.frame_explanation import explain, show_explanation
-from scenicq.query.explain.interval_changes import Change, least_changes
+from scenicq.query.explain.interval_changes import Shift, least_changes
 from scenicq.query.explain.moments import frame_time, intervals_around
 from scenicq.smt.answer import Solver
 from scenicq.store.labels import Label
@@ -49,7 +50,7 @@ class IntervalExplanation:
         interval: The match, else what came furthest; None where no frame matches the initial scene.
         roles: The track of each object.
         bands: Over the interval.
-        changes: What one number of the program would have to be for the interval to match.
+        changes: What one number of the program would have to be for the recording to match; each was tried.
         failed: What frames failed at that do not match the initial scene.
         example: One of the frames that failed at what the fewest did.
         undecided: How many frames are unknown to match the initial scene, by the reason.
@@ -225,7 +226,8 @@ def explain_recording(query: Query, solver: Solver, name: str, begins: int | flo
         return IntervalExplanation(tracks, None, failed=failed, example=example, undecided=undecided)
     best = max(results, key=lambda each: (each.truth, each.cut_off, each.end - each.start))
     roles = tuple((scenario.objects[index].name, track[1] or "ego") for index, track in best.binding)
-    changes = tuple(change.text() for change in changes_of(scenario, tracks, best))
+    shifts = [shifted(each, best.broken) for each in changes_of(scenario, tracks, best)[: LIMITS.ranked_numbers]]
+    changes = tuple(each.text for each in shifts if longest_with(query, name, each) is not None)
     bands = bands_of(scenario, tracks, best)
     least_s = None if dynamic else query.options.time.min_duration_s
     return IntervalExplanation(tracks, best, roles, bands, changes, undecided=undecided, least_s=least_s)
@@ -301,7 +303,7 @@ def _around(result: Result) -> str:
 
 def changes_of(
     scenario: Scenario, tracks: RecordingTracks, interval: IntervalVerdict, *, quick: bool = False
-) -> tuple[Change, ...]:
+) -> tuple[Shift, ...]:
     """What would let an interval through: the requirement that is broken hold, or the program end; the least first.
 
     Args:

@@ -99,7 +99,7 @@ def intervals_around(query: Query, label: Label) -> list[Result]:
         ScenarioError: The program does not fit the map of the frame.
     """
     world = query.compiled_map(label.map)
-    alone = query.alone(label.recording, label.map, world, query.options.match)
+    alone = query.alone(label.recording, label.map, world, query.options)
     found = [
         each
         for each in alone.results()

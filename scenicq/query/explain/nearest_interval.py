@@ -9,20 +9,28 @@ been tried: with it the recording matches.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
-from scenicq.errors import Span
 from scenicq.limits import LIMITS
-from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import Tolerance
 from scenicq.match.verdict import Cause, Match, NoMatch
-from scenicq.query.execution.block_matcher import CompiledMap
 from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query
-from scenicq.query.explain.interval_changes import Change
+from scenicq.query.explain.changes import (
+    LADDER_M,
+    Change,
+    interval_length,
+    lasting,
+    least,
+    longest_with,
+    shifted,
+    show_tolerance,
+    tolerating,
+)
 from scenicq.query.explain.interval_explanation import changes_of, placed
-from scenicq.query.explain.nearest_miss import FINEST_M, LADDER_M, show_tolerance, tell_cut, widened, with_parts
+from scenicq.query.explain.nearest_miss import tell_cut, widened, with_parts
 
 __all__ = ["nearest_intervals"]
 
@@ -58,11 +66,11 @@ def nearest_intervals(query: Query, count: int) -> list[Result]:
     for each in results:
         if each.recording not in matching and isinstance(each.verdict, NoMatch):
             missed.setdefault(each.recording, []).append(each)
-    furthest = sorted(missed.values(), key=lambda mine: -max(map(_length, mine)))
+    furthest = sorted(missed.values(), key=lambda mine: -max(map(interval_length, mine)))
     if len(furthest) > LIMITS.ranked_recordings:
         tell_cut(query, LIMITS.ranked_recordings, "recordings")
     for mine in furthest[: LIMITS.ranked_recordings]:
-        longest = sorted(mine, key=_length, reverse=True)
+        longest = sorted(mine, key=interval_length, reverse=True)
         _keep(near, _by_number(every, longest[: max(1, LIMITS.ranked_bindings // len(missed))]))
         _keep(near, _by_duration(every, longest[0]))
     seen = set(matching)
@@ -85,10 +93,6 @@ def nearest_intervals(query: Query, count: int) -> list[Result]:
     return [each.result for each in nearest[:count]]
 
 
-def _length(result: Result) -> int:
-    return 0 if result.interval is None else result.interval.count
-
-
 def _keep(near: dict[str, _Near], found: _Near | None) -> None:
     """Take a recording in, unless it is known to be nearer."""
     if found is not None and found.amount < near.get(found.result.recording, _Near(math.inf, found.result)).amount:
@@ -108,27 +112,18 @@ def _under(query: Query, tolerance: Tolerance) -> Iterable[Result]:
     return [each for each in other.results() if _is_match(each)]
 
 
-def _longest(query: Query, recording: str, map_name: str, world: CompiledMap, match: MatchOptions) -> Result | None:
-    """The longest interval of a recording that matches under another scenario or other options."""
-    found = [each for each in query.alone(recording, map_name, world, match).results() if _is_match(each)]
-    return max(found, key=_length, default=None)
-
-
 def _is_match(result: Result) -> bool:
     return isinstance(result.verdict, Match)
 
 
-def _map_of(query: Query, recording: str) -> str:
-    """The map that a recording is on."""
-    with query.dataset.connect() as connection:
-        found = connection.execute("SELECT map FROM labels WHERE recording = ? LIMIT 1", [recording]).fetchone()
-    assert found is not None
-    return found[0]
-
-
-def _let_through(found: Result, amount: float, cause: Cause) -> _Near:
+def _near(query: Query, recording: str, change: Change) -> _Near | None:
+    """A recording that a change lets in, with the change as its cause; None where it does not."""
+    found = longest_with(query, recording, change)
+    if found is None:
+        return None
     assert isinstance(found.verdict, Match)
-    return _Near(amount, replace(found, verdict=NoMatch(cause, found.verdict.correspondence)))
+    cause = Cause(change.about, change.text, change.span)
+    return _Near(change.size, replace(found, verdict=NoMatch(cause, found.verdict.correspondence)))
 
 
 def _by_number(query: Query, results: Sequence[Result]) -> _Near | None:
@@ -138,25 +133,13 @@ def _by_number(query: Query, results: Sequence[Result]) -> _Near | None:
         query: The query.
         results: Of one recording, at least one, none of which matches.
     """
-    recording, match = results[0].recording, query.options.match
-    map_name = _map_of(query, recording)
-    world = query.compiled_map(map_name)
-    dynamics = world.scenario.dynamics
-    if dynamics is None:
-        return None
-    changes: list[tuple[float, Change, Span | None]] = []
+    changes: list[Change] = []
     for result in results:
         scenario, tracks, interval = placed(query, result)
-        found = changes_of(scenario, tracks, interval, quick=True)
-        changes += [(abs(each.amount), each, interval.broken) for each in found]
-    for amount, change, broken in sorted(changes, key=lambda each: each[0])[: LIMITS.ranked_numbers]:
-        conditions = change.made(dynamics.conditions)
-        changed = replace(world.scenario, dynamics=replace(dynamics, conditions=conditions))
-        other = CompiledMap.of(changed, world.network, match, prefilter=query.options.prefilter)
-        longest = _longest(query, recording, map_name, other, match)
-        if longest is not None:
-            return _let_through(longest, amount, Cause("program", change.text(), broken))
-    return None
+        changes += [shifted(each, interval.broken) for each in changes_of(scenario, tracks, interval, quick=True)]
+    smallest = sorted(changes, key=lambda each: each.size)[: LIMITS.ranked_numbers]
+    tried = (_near(query, results[0].recording, each) for each in smallest)
+    return next((each for each in tried if each is not None), None)
 
 
 def _by_duration(query: Query, result: Result) -> _Near | None:
@@ -170,13 +153,7 @@ def _by_duration(query: Query, result: Result) -> _Near | None:
     if wanted is None or span is None:
         return None
     enough = math.floor((span.end_us - result.timestamp_us) / 1e4) / 100
-    if not 0 < enough < wanted:
-        return None
-    map_name = _map_of(query, result.recording)
-    shorter = replace(query, options=replace(query.options, time=replace(query.options.time, min_duration_s=enough)))
-    found = _longest(shorter, result.recording, map_name, query.compiled_map(map_name), query.options.match)
-    cause = Cause("--min-duration", f"would match with --min-duration {enough:g}")
-    return None if found is None else _let_through(found, wanted - enough, cause)
+    return _near(query, result.recording, lasting(enough, wanted - enough)) if 0 < enough < wanted else None
 
 
 def _by_tolerance(query: Query, recording: str, enough_m: float, most_m: float) -> _Near | None:
@@ -188,27 +165,21 @@ def _by_tolerance(query: Query, recording: str, enough_m: float, most_m: float) 
         enough_m: Metres of widening under which it does.
         most_m: Metres beyond which it does not matter.
     """
-    map_name, base = _map_of(query, recording), query.options.match
-    world = query.compiled_map(map_name)
 
-    def at(tolerance: Tolerance) -> Result | None:
-        match = replace(base, tolerance=tolerance)
-        other = CompiledMap.of(world.scenario, world.network, match, prefilter=query.options.prefilter)
-        return _longest(query, recording, map_name, other, match)
+    def matches(widening_m: float) -> bool:
+        return longest_with(query, recording, _wider(query, lambda each: widened(each, widening_m))) is not None
 
-    low, high = 0.0, enough_m
-    if most_m < enough_m:
-        if at(widened(base.tolerance, most_m)) is None:
-            return None
-        high = most_m
-    while high - low > max(FINEST_M, high / 100):
-        middle = (low + high) / 2
-        low, high = (low, middle) if at(widened(base.tolerance, middle)) is not None else (middle, high)
-    # one part alone is better advice
-    told = [with_parts(base.tolerance, {part: high}) for part in ("position", "heading")]
-    alone = [each for each in told if at(each) is not None] or [widened(base.tolerance, high)]
-    found = at(alone[0])
-    if found is None:
+    ladder = [most_m] if most_m < enough_m else [enough_m]
+    size = least(matches, ladder, relative=0.01)
+    if size is None:
         return None
-    words = " or ".join(map(show_tolerance, alone))
-    return _let_through(found, high, Cause("tolerance", f"would match with {words}"))
+    # one part alone is better advice
+    parts = [_wider(query, partial(with_parts, parts={part: size})) for part in ("position", "heading")]
+    enough = [each for each in parts if longest_with(query, recording, each) is not None]
+    enough = enough or [_wider(query, lambda each: widened(each, size))]
+    told = f"would match with {' or '.join(each.text for each in enough)}"
+    return _near(query, recording, replace(enough[0], text=told, size=size))
+
+
+def _wider(query: Query, made: Callable[[Tolerance], Tolerance]) -> Change:
+    return tolerating(show_tolerance(made(query.options.match.tolerance)), made, about="tolerance")

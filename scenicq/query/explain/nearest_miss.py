@@ -28,29 +28,20 @@ from scenicq.query.execution.block_matcher import CompiledMap
 from scenicq.query.execution.lazy_solver import LazySolver
 from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query
+from scenicq.query.explain.changes import FINEST_M, LADDER_M, MOST_M, least, show_tolerance
 from scenicq.query.prefilter.executor import names, run_prefilter
 from scenicq.query.prefilter.plan import make_plan
 from scenicq.store.labels import Label
 
 __all__ = [
-    "FINEST_M",
-    "LADDER_M",
     "Closest",
     "closest",
     "nearest_misses",
     "separated",
-    "show_tolerance",
     "tell_cut",
     "widened",
     "with_parts",
 ]
-
-MOST_M = 100.0
-"""Metres beyond which a tolerance is not widened."""
-FINEST_M = 1e-3
-"""Metres to which the least tolerance is found."""
-LADDER_M = (0.01, 0.1, 1.0, 4.0, 16.0, MOST_M)
-"""Metres by which tolerances are widened on the way to the least."""
 
 _TIMEOUT_S = 1.0
 _HEADING_PER_M = math.radians(20)
@@ -107,14 +98,6 @@ def with_parts(tolerance: Tolerance, parts: Mapping[str, float]) -> Tolerance:
     )
 
 
-def show_tolerance(tolerance: Tolerance) -> str:
-    """A tolerance as the option takes it, without what has its default."""
-    items = str(tolerance).split(",")
-    usual = str(Tolerance()).split(",")
-    told = [item for item in items if item not in usual]
-    return ",".join(told if told and "=" in items[0] else items)
-
-
 def closest(matcher: Matcher, label: Label, most_m: float = MOST_M) -> Closest | None:
     """The smallest widening of the matcher's tolerance under which a label matches.
 
@@ -128,33 +111,25 @@ def closest(matcher: Matcher, label: Label, most_m: float = MOST_M) -> Closest |
     """
     patient = replace(matcher.options, timeout_s=min(matcher.options.timeout_s, _TIMEOUT_S))
 
-    def at(widening_m: float) -> Closest | None:
+    reached: dict[float, Closest] = {}
+
+    def matches(widening_m: float) -> bool:
+        if widening_m in reached:
+            return True
         tolerance = widened(patient.tolerance, widening_m)
         finding = matcher.relaxed(replace(patient, tolerance=tolerance)).examine(label)
-        return Closest(widening_m, tolerance, finding) if isinstance(finding.verdict, Match) else None
+        if isinstance(finding.verdict, Match):
+            reached[widening_m] = Closest(widening_m, tolerance, finding)
+        return widening_m in reached
 
-    found = at(0.0)
-    if found is not None:
-        return found
-    if most_m < MOST_M and at(most_m) is None:
+    if matches(0.0):
+        return reached[0.0]
+    # what is no closer than others costs one decision more
+    if most_m < MOST_M and not matches(most_m):
         return None
-    # small tolerances are decided fastest
-    low, best = 0.0, None
-    for size in LADDER_M:
-        best = at(min(size, most_m))
-        if best is not None or size >= most_m:
-            break
-        low = size
-    if best is None:
-        return None
-    while best.widening_m - low > max(FINEST_M, best.widening_m / 100):
-        middle = (low + best.widening_m) / 2
-        found = at(middle)
-        if found is None:
-            low = middle
-        else:
-            best = found
-    return best
+    ladder = [*(size for size in LADDER_M if size < most_m), most_m]
+    found = least(matches, ladder, relative=0.01)
+    return None if found is None else reached[found]
 
 
 def separated(matcher: Matcher, label: Label, found: Closest) -> Closest:
@@ -180,11 +155,10 @@ def separated(matcher: Matcher, label: Label, found: Closest) -> Closest:
     for part in compared:
         # widened alone, a part must be at least as wide as all together
         sizes = [found.widening_m, *(size for size in LADDER_M if size > found.widening_m)]
-        reached = next((place for place, size in enumerate(sizes) if at({part: size})), None)
-        if reached is not None:
-            low = sizes[reached - 1] if reached else max(0.0, 0.98 * found.widening_m - FINEST_M)
-            least = _least(partial(_enough, at, part, {}), low, sizes[reached])
-            alone.append((least, with_parts(base.tolerance, {part: least})))
+        too_little = max(0.0, 0.98 * found.widening_m - FINEST_M)
+        size = least(partial(_enough, at, part, {}), sizes, low=too_little)
+        if size is not None:
+            alone.append((size, with_parts(base.tolerance, {part: size})))
     if alone:
         alone.sort(key=lambda each: each[0])
         return replace(found, alone=tuple(tolerance for _, tolerance in alone))
@@ -194,8 +168,8 @@ def separated(matcher: Matcher, label: Label, found: Closest) -> Closest:
         if at(rest):
             parts = rest
         else:
-            needed = partial(_enough, at, part, rest)
-            parts[part] = _least(needed, 0.0, parts[part])
+            size = least(partial(_enough, at, part, rest), [parts[part]])
+            parts[part] = parts[part] if size is None else size
     finding = at(parts)
     if finding is None:
         return found
@@ -207,14 +181,6 @@ def _enough(
 ) -> bool:
     """Whether a size of one part is enough beside the rest."""
     return at({**rest, part: size}) is not None
-
-
-def _least(enough: Callable[[float], bool], low: float, high: float) -> float:
-    """The least number that is enough, known to lie between two, up to a millimetre."""
-    while high - low > FINEST_M:
-        middle = (low + high) / 2
-        low, high = (low, middle) if enough(middle) else (middle, high)
-    return high
 
 
 def _frames(query: Query, world: CompiledMap, widening_m: float) -> Iterator[tuple[int, str]]:

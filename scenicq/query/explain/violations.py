@@ -28,6 +28,7 @@ from scenicq.match.explanation import (
 )
 from scenicq.match.matcher import Matcher
 from scenicq.match.tolerance import Tolerance
+from scenicq.query.explain.changes import least
 from scenicq.query.explain.sides import sides
 
 __all__ = ["Violation", "allowed_values", "choices", "distance_off", "violations"]
@@ -35,7 +36,6 @@ __all__ = ["Violation", "allowed_values", "choices", "distance_off", "violations
 _PLACED = re.compile(r"(?:on|in) (.+)")
 _LONGEST_NAME = 60
 _FAR_M = 1000.0
-_STEPS = 40
 _FINEST = 1e-4
 
 
@@ -192,14 +192,4 @@ def distance_off(constraint: Comparison, node: Node, observed: Value) -> float |
         wide = Tolerance(position=size, heading=size, other=size)
         return isinstance(decide_decomposed([(constraint, node, observed)], wide), Satisfied)
 
-    if reached(0.0):
-        return 0.0
-    if not reached(high):
-        return None
-    low = 0.0
-    for _ in range(_STEPS):
-        middle = (low + high) / 2
-        low, high = (low, middle) if reached(middle) else (middle, high)
-        if high - low < _FINEST:
-            break
-    return high
+    return 0.0 if reached(0.0) else least(reached, [high], finest=_FINEST)

@@ -119,9 +119,9 @@ def chosen(name: str, options: dict[str, list[float | str]], picks: dict[str, in
     return chosen(found, options, picks) if isinstance(found, str) else found
 
 
-def test_choices_that_several_objects_share_come_out_the_same_in_all() -> None:
+def test_choices_that_several_objects_share_come_out_the_same_in_all(rounds: Callable[[int], int]) -> None:
     found = []
-    for seed in range(40):
+    for seed in range(rounds(60)):
         rng = random.Random(seed)
         options: dict[str, list[float | str]] = {}
         for number in range(rng.randint(4, 7)):

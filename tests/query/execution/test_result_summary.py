@@ -312,6 +312,7 @@ def test_a_piece_of_an_older_version_is_gathered_and_says_nothing(run: Any, cros
 
 
 @pytest.mark.parametrize("jobs", ["1", "2"])
+@pytest.mark.one_in(2)
 def test_a_resumed_run_says_what_an_undisturbed_one_says(run: Any, crossroads: Path, tmp_path: Path, jobs: str) -> None:
     for options in ((), ("--limit", "7")):
         words = ("match", "-e", PAIR, crossroads, *options, "--exit-zero", "--jobs", jobs)

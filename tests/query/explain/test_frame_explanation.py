@@ -14,8 +14,9 @@ from scenicq.match.options import MatchOptions
 from scenicq.match.problem.evaluation import show_value
 from scenicq.match.tolerance import EXACT, Tolerance, parse_tolerance
 from scenicq.match.verdict import Match, NoMatch
+from scenicq.query.explain.changes import show_tolerance
 from scenicq.query.explain.frame_explanation import explain, show_explanation
-from scenicq.query.explain.nearest_miss import closest, separated, show_tolerance, widened
+from scenicq.query.explain.nearest_miss import closest, separated, widened
 from scenicq.store.labels import Label, LabelObject
 
 STREET = street()

@@ -90,7 +90,8 @@ def test_what_is_cut_off_may_be_broken_already(tmp_path, crossroads):
     lines = told(tmp_path, crossroads, PROGRAMS / "01_pedestrian_crosses.scenic", "05-two-lane-traffic")
     assert any(line.startswith("cut off") for line in lines)
     assert any("broken at 12.5 s" in line for line in lines)
-    assert "  = `(distance to walker) < 40` would do with 206.2 instead of 40" in lines
+    # with any distance the recording would still end before the program does
+    assert not any("would do" in line for line in lines)
 
 
 def test_a_recording_in_which_nothing_begins(tmp_path, crossroads):
@@ -111,7 +112,7 @@ def test_what_would_do_does(tmp_path, crossroads, name):
         path.write_text(text, encoding="utf-8")
         done = CliRunner().invoke(cli, ["explain", str(path), str(crossroads), recording, "--exit-zero"])
         for line in done.stdout.splitlines():
-            if "would do with" not in line or "cut off" in done.stdout:
+            if "would do with" not in line:
                 continue
             what = line.split("`")[1]
             new, old = line.split("would do with ")[1].split(" instead of ")

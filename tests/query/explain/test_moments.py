@@ -32,6 +32,7 @@ def programs(tmp_path_factory):
 
 
 @pytest.mark.parametrize("seconds", ["0.5", "2", "12"])
+@pytest.mark.one_in(3)
 def test_a_recording_and_a_frame_match_where_match_has_an_interval(run, crossroads, programs, seconds):
     program = programs / "along.scenic"
     found = lines_of(run("match", program, crossroads, "--min-duration", seconds, "--format", "jsonl"))

@@ -59,6 +59,7 @@ def test_under_the_tolerance_that_is_told_the_recording_matches_and_under_a_smal
         assert (matching(with_tolerance(text, program, crossroads)) > matching(query)) == matches
 
 
+@pytest.mark.slow
 def test_a_ranking_that_has_not_looked_at_all_recordings_says_so(crossroads, monkeypatch):
     program = "parked = new Car\nrequire (distance to parked) < 30\nrequire always parked.speed < 0.2\n"
     for most, cut in ((200, []), (1, ["ranking-cut"])):
@@ -84,6 +85,7 @@ def test_with_the_number_that_is_told_the_recording_matches(crossroads):
     assert matching(ask(crossroads, program.replace("0.2", str(0.99 * amounts[0])))) == matching(query)
 
 
+@pytest.mark.slow
 def test_a_number_that_is_not_enough_is_not_told(crossroads):
     # both requirements are broken, so that no number helps alone; and no tolerance does
     program = (
@@ -117,6 +119,7 @@ def test_an_interval_that_is_too_short_says_which_duration_would_do(crossroads):
     assert not matching(ask(crossroads, program, longer))
 
 
+@pytest.mark.slow
 def test_a_number_that_the_program_says_twice_is_one_number(crossroads):
     program = (
         "walker = new Pedestrian\nrequire (distance to walker) > 3\nrequire eventually (distance to walker) < 1\n"

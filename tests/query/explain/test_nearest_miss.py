@@ -44,6 +44,7 @@ def test_the_ranking_is_that_of_looking_at_every_frame(query):
         assert isinstance(Matcher(matcher.scenario, MatchOptions(tolerance=tolerance)).match(label), Match)
 
 
+@pytest.mark.slow
 def test_a_ranking_that_has_not_looked_at_all_says_so(run, crossroads, scenarios, monkeypatch):
     words = ("match", scenarios / "02_crossing_cars.scenic", crossroads, "--near", 2, "--jobs", 1, "--format", "ids")
     told = "warning[ranking-cut]: --near looked at 3 frames: others may come closer"
