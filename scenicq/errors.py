@@ -118,6 +118,7 @@ CODES: dict[str, str] = {
     "default-view": "what cannot be seen under a view that the program does not set",
     "exact-place": "one point beside another object, to within a small tolerance",
     "mutated-place": "a place or direction that noise without bound takes back",
+    "unbounded-number": "a requirement that a random number without bounds always lets hold",
     "box-cannot-fit": "a region that is too small for the object that must lie in it",
     "class-folded": "a class that coarse classes do not tell from others",
     "unknown-property": "a property that no class has and nothing reads",

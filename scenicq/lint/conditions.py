@@ -7,7 +7,8 @@ negative, positions lie near the map. What intervals leave open is not spoken of
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Mapping
 from typing import cast
 
 from shapely import minimum_rotated_rectangle
@@ -25,10 +26,12 @@ from scenicq.forest.nodes import (
     Constant,
     Encloses,
     Feature,
+    Identity,
     Leaf,
     Logic,
     LogicOp,
     Node,
+    Normal,
     Range,
     RectangleAt,
     Select,
@@ -36,7 +39,7 @@ from scenicq.forest.nodes import (
 )
 from scenicq.forest.scenario import Requirement, Scenario
 from scenicq.forest.value_numbers import ValueNumbers
-from scenicq.forest.walk import postorder, transform
+from scenicq.forest.walk import features, leaves, postorder, transform
 from scenicq.geometry import shapes
 from scenicq.geometry.membership import bounds as region_bounds
 from scenicq.geometry.network import Network
@@ -82,6 +85,7 @@ def lint_scenario(
             if network is not None:
                 yield from _too_large(scenario, requirement)
     yield from _exclusive(scenario)
+    yield from _unbounded(scenario)
     yield from _folded(scenario, options)
     yield from _headings(scenario)
     yield from _mutated(scenario)
@@ -229,6 +233,36 @@ def _bounds(condition: Node) -> Iterator[tuple[Node, CompareOp, float]]:
                 yield compared, MIRRORED[op], float(number)
             case _:
                 pass
+
+
+def _unbounded(scenario: Scenario) -> Iterator[Diagnostic]:
+    """Orders of numbers one side of which is random, without bounds, and said nowhere else."""
+    given = [each.value for owner in scenario.objects for each in owner.properties.values() if each.explicit]
+    asked = [each for each in scenario.requirements if each.built_in is None]
+    roots = [*given, *(each.condition for each in (*asked, *scenario.soft))]
+    # whether a number stands in one root alone; what is drawn of it there is for that root to choose
+    uses = Counter(leaf for root in roots for leaf in {each.identity for each in leaves(root)})
+    for requirement in asked:
+        free = (
+            side
+            for node in postorder((requirement.condition,))
+            if isinstance(node, Compare) and node.op in MIRRORED
+            for side in (node.left, node.right)
+            if _is_free(side, uses)
+        )
+        for side in free:
+            written = _written(side.span) if side.span is not None else "a number"
+            yield _warning(
+                "unbounded-number", f"`{written}` may come out as any number: one of them lets this hold",
+                requirement.span, "excludes nothing", "`TruncatedNormal(mean, deviation, low, high)` has bounds",
+            )  # fmt: skip
+
+
+def _is_free(side: Node, uses: Mapping[Identity, int]) -> bool:
+    """Whether a side of an order is a random number without bounds that nothing else reads."""
+    drawn = leaves(side)
+    alone = len(drawn) == 1 and isinstance(drawn[0], Normal) and uses[drawn[0].identity] == 1
+    return alone and not features(side) and scalar_bounds(side) == (-math.inf, math.inf)
 
 
 # --- boxes
