@@ -91,7 +91,7 @@ def coordinates(values: dict[tuple[int, str], Value], count: int) -> list[float]
 )
 def test_scenes_are_distributed_as_by_plain_rejection(name: str) -> None:
     scenario = compiled(PROGRAMS[name])
-    number, count = 60, len(scenario.objects)
+    number, count = 120, len(scenario.objects)
     definition = plain_rejection(scenario, random.Random(1))
     expected = [coordinates(next(definition), count) for _ in range(number)]
     for prune in (True, False):
