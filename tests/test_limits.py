@@ -26,7 +26,7 @@ NO_LIMITS = {
     "match/decide/decomposition.py": "_FEW_OPTIONS: which of two ways comes first",
     "match/fields/witness_search.py": "_FEW: draws of a search that has nowhere to go",
     "query/execution/result_files.py": "_LONGEST: what a cell of a file may be",
-    "query/explain/nearest_miss.py": "MOST_M: how far `--near` looks",
+    "query/explain/changes.py": "MOST_M: how far `--near` looks",
     "query/explain/violations.py": "_LONGEST_NAME: a name that is shown",
     "query/prefilter/executor.py": "_FEWEST_FRAMES, _MOST_FRAMES, _MOST_NAMED: sizes of blocks",
     "smt/smtlib.py": "_LONGEST: nesting beyond which a part has a name",
