@@ -25,6 +25,7 @@ from scenicq.forest.nodes import (
     Coordinate,
     Corridor,
     CourseCoordinate,
+    CourseMeasure,
     DirectionAt,
     DiscAt,
     Distance,
@@ -53,6 +54,7 @@ from scenicq.forest.walk import children, is_leaf
 from scenicq.geometry.angles import azimuth, rotate, wrap
 from scenicq.geometry.boxes import box_polygon
 from scenicq.geometry.containment import covers, overlaps
+from scenicq.geometry.course_measures import measure_courses
 from scenicq.geometry.driven_courses import CoursePlace, lane_course
 from scenicq.geometry.fields import VectorField
 from scenicq.geometry.membership import contains, distance
@@ -182,6 +184,15 @@ def _course_coordinate(node: CourseCoordinate, course: CoursePlace, x: float, y:
     return low
 
 
+def _course_measure(node: CourseMeasure, courses: tuple[CoursePlace, ...]) -> float:
+    low, high = measure_courses(node.measure, courses, node.seconds)
+    if node.end is not None:
+        return high if node.end else low
+    if low != high:
+        raise CannotEvaluate("how the track goes on")
+    return low
+
+
 def directions(field: Value, point: Value) -> tuple[float, ...] | Undefined:
     """The headings that a vector field allows at a point, at least one; `Undefined` where it has none.
 
@@ -284,6 +295,8 @@ def _compute_region(node: Node, args: tuple[Value, ...]) -> Value:
             return distance(cast(Region, region), x, y)
         case CourseCoordinate(), (CoursePlace() as course, (float() as x, float() as y)):
             return _course_coordinate(node, course, x, y)
+        case CourseMeasure(), _ if all(isinstance(each, CoursePlace) for each in given):
+            return _course_measure(node, cast("tuple[CoursePlace, ...]", given))
         case LaneCourse(), ((float() as x, float() as y), float() as heading):
             return lane_course(node.network, x, y, heading)
         case Corridor(), (CoursePlace() as course, float() as half_width):

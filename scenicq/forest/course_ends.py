@@ -1,4 +1,4 @@
-"""Conditions on numbers that are known up to two ends, as how far something is along a course (`CourseCoordinate`).
+"""Conditions on numbers that are known up to two ends: measures of courses (`CourseCoordinate`, `CourseMeasure`).
 
 A condition on such a number becomes two on its ends: one that holds only where the condition surely does, one that
 holds wherever it may. Where the form of a condition does not tell which ends these are, it is known where
@@ -20,6 +20,7 @@ from scenicq.forest.nodes import (
     CompareOp,
     Constant,
     CourseCoordinate,
+    CourseMeasure,
     LogicOp,
     Node,
 )
@@ -57,7 +58,7 @@ def _is(node: Node, value: bool) -> bool:
 
 def has_ends(node: Node) -> bool:
     """Whether a node is a number that is known up to two ends."""
-    return isinstance(node, CourseCoordinate) and node.end is None
+    return isinstance(node, CourseCoordinate | CourseMeasure) and node.end is None
 
 
 def truths_by_ends(node: Node) -> Truths:
@@ -66,7 +67,8 @@ def truths_by_ends(node: Node) -> Truths:
         left, right = _ends(node.left), _ends(node.right)
         if left is not None and right is not None:
             return _compared(node, left, right)
-    numbers = [each for each in postorder((node,)) if isinstance(each, CourseCoordinate) and has_ends(each)]
+    measures = (each for each in postorder((node,)) if isinstance(each, CourseCoordinate | CourseMeasure))
+    numbers = [each for each in measures if has_ends(each)]
     lower = {id(each): replace(each, end=0) for each in numbers}
     exact = [build.compare(CompareOp.LE, replace(each, end=1), lower[id(each)], node.span) for each in numbers]
     same = transform(node, lambda each: lower.get(id(each), each))
@@ -105,7 +107,7 @@ def _ends(root: Node) -> Truths | None:
 
 def _ends_of(node: Node, below: list[Truths | None]) -> Truths | None:
     """As `_ends`, given those of what is below."""
-    if isinstance(node, CourseCoordinate):
+    if isinstance(node, CourseCoordinate | CourseMeasure):
         return (replace(node, end=0), replace(node, end=1)) if has_ends(node) else None
     args = [each for each in below if each is not None]
     if not isinstance(node, Arithmetic) or len(args) < len(below):

@@ -23,6 +23,7 @@ from scenicq.forest.nodes import (
     CompareOp,
     Corridor,
     CourseCoordinate,
+    CourseMeasure,
     DirectionAt,
     DiscAt,
     DiscreteRange,
@@ -251,7 +252,7 @@ class IntervalDomain(IntervalArithmetic[E]):
         match node:
             case DirectionAt():
                 return self.within(-math.pi, math.pi)
-            case CourseCoordinate():
+            case CourseCoordinate() | CourseMeasure():
                 return self.within(-math.inf, math.inf)
             case LaneCourse():
                 return None

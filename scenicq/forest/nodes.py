@@ -17,6 +17,7 @@ from enum import StrEnum
 from typing import ClassVar, Literal, TypeAlias
 
 from scenicq.errors import Span
+from scenicq.geometry.course_measures import CourseMeasureName
 from scenicq.geometry.driven_courses import CoursePlace
 from scenicq.geometry.fields import VectorField
 from scenicq.geometry.network import Network
@@ -25,9 +26,9 @@ from scenicq.geometry.regions import Region
 __all__ = [
     "COURSE", "ELEMENT", "GIVEN", "IDENTITY", "MIRRORED", "RANK", "TRACK", "WHO",
     "Among", "AmongOp", "Arithmetic", "ArithmeticOp", "Bearing", "Body", "Compare", "CompareOp", "Constant", "Contains",
-    "Coordinate", "Corridor", "CourseCoordinate", "DirectionAt", "DiscAt", "DiscreteRange", "Distance", "Encloses",
-    "Feature", "Identity", "Index", "Intersects", "Kind", "LaneCourse", "Leaf", "Logic", "LogicOp", "Node", "Norm",
-    "Normal", "PointIn", "Range", "RectangleAt", "RegionDifference", "RegionIntersection", "RegionUnion", "Rotate",
+    "Coordinate", "Corridor", "CourseCoordinate", "CourseMeasure", "DirectionAt", "DiscAt", "DiscreteRange", "Distance",
+    "Encloses", "Feature", "Identity", "Index", "Intersects", "Kind", "LaneCourse", "Leaf", "Logic", "LogicOp", "Node",
+    "Norm", "Normal", "PointIn", "Range", "RectangleAt", "RegionDifference", "RegionIntersection", "RegionUnion", "Rotate",
     "Scale", "SectorAt", "Select", "TruncatedNormal", "Undefined", "Value", "Vector", "VectorOf", "VectorSum",
 ]  # fmt: skip
 
@@ -301,6 +302,23 @@ class CourseCoordinate(_Scalar):
     end: int | None = None
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class CourseMeasure(_Scalar):
+    """A measure of how the tracks of one or two objects go on (`scenicq.geometry.course_measures`).
+
+    Attributes:
+        measure: Which.
+        courses: Of the objects.
+        seconds: Over how long, where that matters.
+        end: As of `CourseCoordinate`.
+    """
+
+    measure: CourseMeasureName
+    courses: tuple[Node, ...]
+    seconds: float = 0.0
+    end: int | None = None
+
+
 # --- courses
 
 
@@ -532,6 +550,7 @@ class Among(_Node):
 Leaf: TypeAlias = Range | Normal | TruncatedNormal | DiscreteRange | Index | PointIn
 Node: TypeAlias = (
     Constant | Feature | Leaf | Select | Arithmetic | Coordinate | Norm | Bearing | Distance | DirectionAt |
-    CourseCoordinate | LaneCourse | VectorOf | VectorSum | Scale | Rotate | DiscAt | SectorAt | RectangleAt | Corridor |
+    CourseCoordinate | CourseMeasure | LaneCourse | VectorOf | VectorSum | Scale | Rotate | DiscAt | SectorAt |
+    RectangleAt | Corridor |
     RegionUnion | RegionIntersection | RegionDifference | Compare | Logic | Contains | Intersects | Encloses | Among
 )  # fmt: skip

@@ -18,6 +18,7 @@ from scenicq.forest.nodes import (
     Constant,
     Coordinate,
     CourseCoordinate,
+    CourseMeasure,
     DirectionAt,
     Feature,
     Intersects,
@@ -95,6 +96,8 @@ class ValueNumbers:
                     own = node.axis
                 case CourseCoordinate():
                     own = node.axis, node.end
+                case CourseMeasure():
+                    own = node.measure, node.seconds, node.end
                 case LaneCourse():
                     own = id(node.network), node.gap_s
                 case _ if is_leaf(node):

@@ -22,6 +22,7 @@ from scenicq.forest.nodes import (
     Coordinate,
     Corridor,
     CourseCoordinate,
+    CourseMeasure,
     DirectionAt,
     DiscAt,
     DiscreteRange,
@@ -174,7 +175,7 @@ class Expressions:
             case Bearing():
                 x, y = cast(TermVector, args[0])
                 return apply(Operator.ATAN2, apply(Operator.NEG, x), y)
-            case CourseCoordinate() | LaneCourse() | Corridor():
+            case CourseCoordinate() | CourseMeasure() | LaneCourse() | Corridor():
                 raise UnsupportedError("a course that hangs on what no label shows")
             case Among():
                 raise UnsupportedError("a condition on other label objects that hangs on what no label shows")

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scenicq.geometry.angles import normalize_array
 from scenicq.store.columns import MemberColumns
 
-__all__ = ["FITTED_S", "FITTED_SAMPLES", "LONGEST_GAP_US", "MotionColumns", "motion_of", "track_numbers"]
+__all__ = ["FITTED_S", "FITTED_SAMPLES", "LONGEST_GAP_US", "MotionColumns", "motion_of", "slopes", "track_numbers"]
 
 LONGEST_GAP_US = 1_500_000
 """Microseconds between two samples of a track beyond which neither says anything of the other."""
@@ -62,7 +62,7 @@ def motion_of(times_us: NDArray[np.int64], members: MemberColumns, tracks: Seque
     sine, cosine = np.sin(members.heading), np.cos(members.heading)
     backwards = vy * cosine - vx * sine < 0
     speed = np.where(np.isnan(members.heading), np.nan, np.hypot(vx, vy) * np.where(backwards, -1.0, 1.0))
-    acceleration = _slopes(times_us, speed, tracks)
+    acceleration = slopes(times_us, speed, tracks)
     return MotionColumns(vx, vy, acceleration, steps.rate(members.heading, turns=True), derived)
 
 
@@ -108,7 +108,7 @@ class _Steps:
         return np.divide(change, seconds, out=np.full(len(values), np.nan), where=seconds > 0)
 
 
-def _slopes(times_us: NDArray[np.int64], values: Numbers, tracks: Sequence[str | None]) -> Numbers:
+def slopes(times_us: NDArray[np.int64], values: Numbers, tracks: Sequence[str | None]) -> Numbers:
     """Least-squares slopes of values over the samples around each, a second; nan where a track has too few samples.
 
     The samples are those of the track that have a value, equally many on both sides, as long as there are any.

@@ -1,0 +1,196 @@
+"""Measures of the field in `scenicq.labels`: time to collision, time headway, post-encroachment time and their like.
+
+Those of one instant are expressions over what labels observe of both objects, so that all that reads expressions reads
+them; those of how tracks go on are asked of their courses (`scenicq.geometry.course_measures`). Definitions, units and
+sources stand in `tests/language/measures.md`, and in `scenicq.labels` for real Scenic.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import reduce
+from typing import TYPE_CHECKING
+
+from scenicq.compiler.coerce import property_node, to_heading, to_scalar, to_vector
+from scenicq.compiler.operators import object_box
+from scenicq.compiler.road_courses import along, course_of
+from scenicq.compiler.values import Instance, ModelValue, describe, fail
+from scenicq.errors import Span
+from scenicq.forest import build
+from scenicq.forest.nodes import (
+    ArithmeticOp,
+    CompareOp,
+    Constant,
+    CourseMeasure,
+    Distance,
+    Intersects,
+    LogicOp,
+    Node,
+    Select,
+)
+from scenicq.geometry.course_measures import NEVER
+
+if TYPE_CHECKING:
+    from scenicq.compiler.interpreter import Interpreter
+
+__all__ = [
+    "box_distance",
+    "course_change",
+    "deceleration_to_avoid",
+    "jerk",
+    "post_encroachment_time",
+    "time_headway",
+    "time_to_collision",
+]
+
+_STANDING = 1e-6
+"""Metres a second below which something counts as not moving."""
+_ZERO, _HALF, _TWO, _NEVER = (build.constant(value) for value in (0.0, 0.5, 2.0, NEVER))
+
+
+def time_to_collision(run: Interpreter, span: Span, one: ModelValue, other: ModelValue) -> Node:
+    """Seconds until the boxes of two objects touch if both go on with their velocities, without turning."""
+    a, b = (_Seen(each, "time_to_collision", span) for each in (one, other))
+    apart = build.vector_difference(b.position, a.position)
+    closing = build.vector_difference(b.velocity, a.velocity)
+    begins: list[Node] = []
+    ends: list[Node] = []
+    # boxes meet while their shadows on all four of their directions do
+    for own, far in ((a, b), (b, a)):
+        turned = build.minus(far.heading, own.heading)
+        cosine, sine = (_abs(build.arithmetic(op, turned)) for op in (ArithmeticOp.COS, ArithmeticOp.SIN))
+        back = build.arithmetic(ArithmeticOp.NEG, own.heading)
+        for axis, (mine, near, side) in enumerate(
+            ((own.width, far.width, far.length), (own.length, far.length, far.width))
+        ):
+            # half of what the far box covers in this direction: its side that lies so, and the other
+            reach = _times(_HALF, build.add(mine, build.add(_times(near, cosine), _times(side, sine))))
+            away, speed = (build.coordinate(build.rotate(each, back), axis) for each in (apart, closing))
+            moves = build.compare(CompareOp.GT, _abs(speed), build.constant(_STANDING))
+            meets = build.compare(CompareOp.LE, _abs(away), reach)
+            middle = build.arithmetic(ArithmeticOp.NEG, build.arithmetic(ArithmeticOp.DIV, away, speed))
+            while_ = build.arithmetic(ArithmeticOp.DIV, reach, _abs(speed))
+            still = [
+                Select(meets, (_NEVER, build.arithmetic(ArithmeticOp.NEG, _NEVER))),
+                Select(meets, (_ZERO, _NEVER)),
+            ]
+            begins.append(Select(moves, (still[0], build.minus(middle, while_)), span=span))
+            ends.append(Select(moves, (still[1], build.add(middle, while_)), span=span))
+    begin, end = _extreme(ArithmeticOp.MAX, begins), _extreme(ArithmeticOp.MIN, ends)
+    comes = build.logic(
+        LogicOp.AND, build.compare(CompareOp.LE, begin, end), build.compare(CompareOp.GE, end, _ZERO), span=span
+    )
+    until = _extreme(ArithmeticOp.MIN, [_extreme(ArithmeticOp.MAX, [begin, _ZERO]), _NEVER])
+    return Select(comes, (_NEVER, until), span=span)
+
+
+def time_headway(run: Interpreter, span: Span, one: ModelValue, other: ModelValue) -> Node:
+    """Seconds until the front of an object is where that of another is now, along its course at its speed."""
+    a, b = (_Seen(each, "time_headway", span) for each in (one, other))
+    way = build.add(along(run, span, one, other), _times(_HALF, build.minus(b.length, a.length)))
+    comes = build.logic(
+        LogicOp.AND, build.compare(CompareOp.GE, way, _ZERO),
+        build.compare(CompareOp.GT, a.speed, build.constant(_STANDING)), span=span,
+    )  # fmt: skip
+    until = _extreme(ArithmeticOp.MIN, [build.arithmetic(ArithmeticOp.DIV, way, a.speed), _NEVER])
+    return Select(comes, (_NEVER, until), span=span)
+
+
+def deceleration_to_avoid(run: Interpreter, span: Span, one: ModelValue, other: ModelValue) -> Node:
+    """The constant deceleration with which an object just does not hit another that drives ahead on its course."""
+    a, b = (_Seen(each, "deceleration_to_avoid", span) for each in (one, other))
+    way = along(run, span, one, other)
+    gap = build.minus(way, _times(_HALF, build.add(a.length, b.length)))
+    closing = build.minus(a.speed, b.speed)
+    needed = build.logic(
+        LogicOp.AND, build.compare(CompareOp.GT, way, _ZERO), build.compare(CompareOp.GT, closing, _ZERO), span=span
+    )
+    amount = build.arithmetic(ArithmeticOp.DIV, _times(closing, closing), _times(_TWO, gap))
+    some = build.compare(CompareOp.GT, gap, build.constant(_STANDING))
+    avoided = Select(some, (_NEVER, _extreme(ArithmeticOp.MIN, [amount, _NEVER])), span=span)
+    return Select(needed, (_ZERO, avoided), span=span)
+
+
+def box_distance(run: Interpreter, span: Span, one: ModelValue, other: ModelValue) -> Node:
+    """Metres between the boxes of two objects; 0 where they touch."""
+    boxes = [_Seen(each, "box_distance", span) for each in (one, other)]
+    areas = [object_box(each.instance, span) for each in boxes]
+    ways = [
+        Distance(area, corner, span=span)
+        for area, far in zip(areas, reversed(boxes), strict=True)
+        for corner in far.corners()
+    ]
+    return Select(Intersects(*areas, span=span), (_extreme(ArithmeticOp.MIN, ways), _ZERO), span=span)
+
+
+def jerk(run: Interpreter, span: Span, owner: ModelValue) -> Node:
+    """The slope of the acceleration of an object, metres per second cubed."""
+    return CourseMeasure("jerk", (course_of(run, owner, "jerk", span),), span=span)
+
+
+def course_change(run: Interpreter, span: Span, owner: ModelValue, seconds: ModelValue) -> Node:
+    """How far the course of an object turns to the left in the next seconds, radians."""
+    number = seconds.value if isinstance(seconds, Constant) else seconds
+    if isinstance(number, bool) or not isinstance(number, int | float) or not 0 < number < 1e6:
+        raise fail("wrong-value", "`course_change` needs a known number of seconds, which is positive", span,
+                   f"this is {number if isinstance(number, int | float) else describe(seconds)}")  # fmt: skip
+    return CourseMeasure(
+        "course_change", (course_of(run, owner, "course_change", span),), float(number), span=span
+    )  # fmt: skip
+
+
+def post_encroachment_time(run: Interpreter, span: Span, one: ModelValue, other: ModelValue) -> Node:
+    """Seconds between the one object and the other at a place that both cover, the least of all places."""
+    courses = tuple(course_of(run, each, "post_encroachment_time", span) for each in (one, other))
+    return CourseMeasure("post_encroachment_time", courses, span=span)
+
+
+class _Seen:
+    """What labels observe of an object."""
+
+    def __init__(self, value: ModelValue, name: str, span: Span) -> None:
+        if not isinstance(value, Instance) or value.index is None:
+            raise fail("wrong-type", f"`{name}` is about objects", span, f"this is {describe(value)}",
+                       ("name an object, such as `ego`",))  # fmt: skip
+        self.instance, self._span = value, span
+        self.position, self.heading = to_vector(value, span), to_heading(value, span)
+
+    @property
+    def velocity(self) -> Node:
+        return to_vector(property_node(self.instance, "velocity", self._span), self._span)
+
+    @property
+    def speed(self) -> Node:
+        return self._number("speed")
+
+    @property
+    def width(self) -> Node:
+        return self._number("width")
+
+    @property
+    def length(self) -> Node:
+        return self._number("length")
+
+    def _number(self, name: str) -> Node:
+        return to_scalar(property_node(self.instance, name, self._span), self._span)
+
+    def corners(self) -> list[Node]:
+        halves = [_times(_HALF, each) for each in (self.width, self.length)]
+        other = [build.arithmetic(ArithmeticOp.NEG, each) for each in halves]
+        return [
+            build.offset_local(self.position, self.heading, build.vector(x, y))
+            for x in (halves[0], other[0])
+            for y in (halves[1], other[1])
+        ]
+
+
+def _abs(node: Node) -> Node:
+    return build.arithmetic(ArithmeticOp.ABS, node)
+
+
+def _times(left: Node, right: Node) -> Node:
+    return build.arithmetic(ArithmeticOp.MUL, left, right)
+
+
+def _extreme(op: ArithmeticOp, nodes: Sequence[Node]) -> Node:
+    return reduce(lambda one, other: build.arithmetic(op, one, other), nodes)
