@@ -287,7 +287,7 @@ def _tell_cut(query: Query, *, resume: bool) -> None:
 
 def _tell_unclear(selection: ResultSelection) -> None:
     """Say that a condition is not known of some matches."""
-    what = f"of {count(selection.unclear, 'match', 'matches')} it is not known whether --where holds"
+    what = f"of {count(selection.unclear, 'match')} it is not known whether --where holds"
     message = f"{what}, as what is recorded is null: left out"
     hints = ("`unrecorded` of results says why",)
     show([Diagnostic("results-incomplete", message, hints=hints, severity="warning")])

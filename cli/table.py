@@ -10,6 +10,7 @@ from typing import IO, BinaryIO, cast
 import click
 from msgspec import UNSET
 
+from scenicq.query.execution.recorded_columns import show_cell
 from scenicq.query.execution.records import CauseRecord, CellRecord, IntervalRecord, Record, SeriesRecord
 from scenicq.query.execution.result_summary import ResultSummary
 from scenicq.store.frame_names import ShortNames
@@ -247,16 +248,8 @@ def _recorded(record: Record) -> str:
 def _short(value: CellRecord | SeriesRecord) -> str:
     match value:
         case SeriesRecord(minimum=int() | float() as least, maximum=int() | float() as most):
-            return f"{least:z.3g} to {most:z.3g}"
+            return f"{show_cell(least)} to {show_cell(most)}"
         case SeriesRecord():
-            return f"{_short(value.first)} ... {_short(value.last)}"
-        case None:
-            return "-"
-        case bool():
-            return "yes" if value else "no"
-        case str():
-            return value
-        case tuple():
-            return f"({', '.join(f'{each:z.2f}' for each in value)})"
+            return f"{show_cell(value.first)} ... {show_cell(value.last)}"
         case _:
-            return f"{value:z.3g}"
+            return show_cell(value)

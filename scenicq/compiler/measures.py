@@ -1,7 +1,7 @@
 """Measures of the field in `scenicq.labels`: time to collision, time headway, post-encroachment time and their like.
 
 Those of one instant are expressions over what labels observe of both objects, so that all that reads expressions reads
-them; those of how tracks go on are asked of their courses (`scenicq.geometry.course_measures`). Definitions, units and
+them; those of how tracks go on are asked of their courses (`scenicq.geometry.measures`). Definitions, units and
 sources stand in `tests/language/measures.md`, and in `scenicq.labels` for real Scenic.
 """
 
@@ -21,14 +21,14 @@ from scenicq.forest.nodes import (
     ArithmeticOp,
     CompareOp,
     Constant,
-    CourseMeasure,
     Distance,
     Intersects,
     LogicOp,
+    Measure,
     Node,
     Select,
 )
-from scenicq.geometry.course_measures import NEVER
+from scenicq.geometry.measures import NEVER, STANDING_MPS
 
 if TYPE_CHECKING:
     from scenicq.compiler.interpreter import Interpreter
@@ -43,45 +43,14 @@ __all__ = [
     "time_to_collision",
 ]
 
-_STANDING = 1e-6
-"""Metres a second below which something counts as not moving."""
 _ZERO, _HALF, _TWO, _NEVER = (build.constant(value) for value in (0.0, 0.5, 2.0, NEVER))
 
 
-def time_to_collision(run: Interpreter, span: Span, one: ModelValue, other: ModelValue) -> Node:
+def time_to_collision(_run: Interpreter, span: Span, one: ModelValue, other: ModelValue) -> Node:
     """Seconds until the boxes of two objects touch if both go on with their velocities, without turning."""
-    a, b = (_Seen(each, "time_to_collision", span) for each in (one, other))
-    apart = build.vector_difference(b.position, a.position)
-    closing = build.vector_difference(b.velocity, a.velocity)
-    begins: list[Node] = []
-    ends: list[Node] = []
-    # boxes meet while their shadows on all four of their directions do
-    for own, far in ((a, b), (b, a)):
-        turned = build.minus(far.heading, own.heading)
-        cosine, sine = (_abs(build.arithmetic(op, turned)) for op in (ArithmeticOp.COS, ArithmeticOp.SIN))
-        back = build.arithmetic(ArithmeticOp.NEG, own.heading)
-        for axis, (mine, near, side) in enumerate(
-            ((own.width, far.width, far.length), (own.length, far.length, far.width))
-        ):
-            # half of what the far box covers in this direction: its side that lies so, and the other
-            reach = _times(_HALF, build.add(mine, build.add(_times(near, cosine), _times(side, sine))))
-            away, speed = (build.coordinate(build.rotate(each, back), axis) for each in (apart, closing))
-            moves = build.compare(CompareOp.GT, _abs(speed), build.constant(_STANDING))
-            meets = build.compare(CompareOp.LE, _abs(away), reach)
-            middle = build.arithmetic(ArithmeticOp.NEG, build.arithmetic(ArithmeticOp.DIV, away, speed))
-            while_ = build.arithmetic(ArithmeticOp.DIV, reach, _abs(speed))
-            still = [
-                Select(meets, (_NEVER, build.arithmetic(ArithmeticOp.NEG, _NEVER))),
-                Select(meets, (_ZERO, _NEVER)),
-            ]
-            begins.append(Select(moves, (still[0], build.minus(middle, while_)), span=span))
-            ends.append(Select(moves, (still[1], build.add(middle, while_)), span=span))
-    begin, end = _extreme(ArithmeticOp.MAX, begins), _extreme(ArithmeticOp.MIN, ends)
-    comes = build.logic(
-        LogicOp.AND, build.compare(CompareOp.LE, begin, end), build.compare(CompareOp.GE, end, _ZERO), span=span
-    )
-    until = _extreme(ArithmeticOp.MIN, [_extreme(ArithmeticOp.MAX, [begin, _ZERO]), _NEVER])
-    return Select(comes, (_NEVER, until), span=span)
+    seen = [_Seen(each, "time_to_collision", span) for each in (one, other)]
+    parts = [part for o in seen for part in (o.position, o.heading, o.velocity, o.width, o.length)]
+    return Measure("time_to_collision", tuple(parts), span=span)
 
 
 def time_headway(run: Interpreter, span: Span, one: ModelValue, other: ModelValue) -> Node:
@@ -90,7 +59,7 @@ def time_headway(run: Interpreter, span: Span, one: ModelValue, other: ModelValu
     way = build.add(along(run, span, one, other), _times(_HALF, build.minus(b.length, a.length)))
     comes = build.logic(
         LogicOp.AND, build.compare(CompareOp.GE, way, _ZERO),
-        build.compare(CompareOp.GT, a.speed, build.constant(_STANDING)), span=span,
+        build.compare(CompareOp.GT, a.speed, build.constant(STANDING_MPS)), span=span,
     )  # fmt: skip
     until = _extreme(ArithmeticOp.MIN, [build.arithmetic(ArithmeticOp.DIV, way, a.speed), _NEVER])
     return Select(comes, (_NEVER, until), span=span)
@@ -106,12 +75,12 @@ def deceleration_to_avoid(run: Interpreter, span: Span, one: ModelValue, other: 
         LogicOp.AND, build.compare(CompareOp.GT, way, _ZERO), build.compare(CompareOp.GT, closing, _ZERO), span=span
     )
     amount = build.arithmetic(ArithmeticOp.DIV, _times(closing, closing), _times(_TWO, gap))
-    some = build.compare(CompareOp.GT, gap, build.constant(_STANDING))
+    some = build.compare(CompareOp.GT, gap, build.constant(STANDING_MPS))
     avoided = Select(some, (_NEVER, _extreme(ArithmeticOp.MIN, [amount, _NEVER])), span=span)
     return Select(needed, (_ZERO, avoided), span=span)
 
 
-def box_distance(run: Interpreter, span: Span, one: ModelValue, other: ModelValue) -> Node:
+def box_distance(_run: Interpreter, span: Span, one: ModelValue, other: ModelValue) -> Node:
     """Metres between the boxes of two objects; 0 where they touch."""
     boxes = [_Seen(each, "box_distance", span) for each in (one, other)]
     areas = [object_box(each.instance, span) for each in boxes]
@@ -125,7 +94,7 @@ def box_distance(run: Interpreter, span: Span, one: ModelValue, other: ModelValu
 
 def jerk(run: Interpreter, span: Span, owner: ModelValue) -> Node:
     """The slope of the acceleration of an object, metres per second cubed."""
-    return CourseMeasure("jerk", (course_of(run, owner, "jerk", span),), span=span)
+    return Measure("jerk", (course_of(run, owner, "jerk", span),), span=span)
 
 
 def course_change(run: Interpreter, span: Span, owner: ModelValue, seconds: ModelValue) -> Node:
@@ -134,7 +103,7 @@ def course_change(run: Interpreter, span: Span, owner: ModelValue, seconds: Mode
     if isinstance(number, bool) or not isinstance(number, int | float) or not 0 < number < 1e6:
         raise fail("wrong-value", "`course_change` needs a known number of seconds, which is positive", span,
                    f"this is {number if isinstance(number, int | float) else describe(seconds)}")  # fmt: skip
-    return CourseMeasure(
+    return Measure(
         "course_change", (course_of(run, owner, "course_change", span),), float(number), span=span
     )  # fmt: skip
 
@@ -142,7 +111,7 @@ def course_change(run: Interpreter, span: Span, owner: ModelValue, seconds: Mode
 def post_encroachment_time(run: Interpreter, span: Span, one: ModelValue, other: ModelValue) -> Node:
     """Seconds between the one object and the other at a place that both cover, the least of all places."""
     courses = tuple(course_of(run, each, "post_encroachment_time", span) for each in (one, other))
-    return CourseMeasure("post_encroachment_time", courses, span=span)
+    return Measure("post_encroachment_time", courses, span=span)
 
 
 class _Seen:

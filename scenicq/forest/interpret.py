@@ -21,7 +21,6 @@ from scenicq.forest.nodes import (
     Coordinate,
     Corridor,
     CourseCoordinate,
-    CourseMeasure,
     DirectionAt,
     DiscAt,
     DiscreteRange,
@@ -34,6 +33,7 @@ from scenicq.forest.nodes import (
     Leaf,
     Logic,
     LogicOp,
+    Measure,
     Node,
     Norm,
     Normal,
@@ -59,7 +59,7 @@ __all__ = ["AbstractDomain", "OnMap", "RegionNode", "Steps", "interpret", "steps
 V = TypeVar("V")
 
 OnMap: TypeAlias = (
-    Distance | DirectionAt | Contains | Intersects | Encloses | CourseCoordinate | CourseMeasure | LaneCourse
+    Distance | DirectionAt | Contains | Intersects | Encloses | CourseCoordinate | Measure | LaneCourse
 )  # fmt: skip
 """What is asked of regions, vector fields and courses."""
 RegionNode: TypeAlias = (
@@ -197,7 +197,7 @@ def _value(node: Node, args: list[V], domain: AbstractDomain[V]) -> V:
         case Range() | DiscreteRange() | Normal() | TruncatedNormal() | Index() | PointIn():
             return domain.variable(node, args)
         case (
-            Distance() | DirectionAt() | Contains() | Intersects() | Encloses() | CourseCoordinate() | CourseMeasure()
+            Distance() | DirectionAt() | Contains() | Intersects() | Encloses() | CourseCoordinate() | Measure()
             | LaneCourse()
         ):  # fmt: skip
             return domain.on_map(node, args)

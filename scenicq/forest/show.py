@@ -15,13 +15,13 @@ from scenicq.forest.nodes import (
     Constant,
     Coordinate,
     CourseCoordinate,
-    CourseMeasure,
     DirectionAt,
     Feature,
     Identity,
     Index,
     Leaf,
     Logic,
+    Measure,
     Node,
     Select,
     Undefined,
@@ -87,9 +87,9 @@ def _show(
             return f"(not {args[0]})" if len(args) == 1 else "(" + f" {node.op.value} ".join(args) + ")"
         case Coordinate():
             return f"{args[0]}.{'xy'[node.axis]}"
-        case CourseCoordinate() | CourseMeasure():
-            name = node.measure if isinstance(node, CourseMeasure) else ("along", "beside")[node.axis]
-            seconds = f", {node.seconds:g}" if isinstance(node, CourseMeasure) and node.seconds else ""
+        case CourseCoordinate() | Measure():
+            name = node.measure if isinstance(node, Measure) else ("along", "beside")[node.axis]
+            seconds = f", {node.seconds:g}" if isinstance(node, Measure) and node.seconds else ""
             end = "" if node.end is None else (", at least", ", at most")[node.end]
             return f"{name}({', '.join(args)}{seconds}{end})"
         case Select():

@@ -18,13 +18,13 @@ from scenicq.forest.nodes import (
     Constant,
     Coordinate,
     CourseCoordinate,
-    CourseMeasure,
     DirectionAt,
     Feature,
     Intersects,
     LaneCourse,
     Logic,
     LogicOp,
+    Measure,
     Node,
     Norm,
     Scale,
@@ -96,7 +96,7 @@ class ValueNumbers:
                     own = node.axis
                 case CourseCoordinate():
                     own = node.axis, node.end
-                case CourseMeasure():
+                case Measure():
                     own = node.measure, node.seconds, node.end
                 case LaneCourse():
                     own = id(node.network), node.gap_s

@@ -22,7 +22,6 @@ from scenicq.forest.nodes import (
     Coordinate,
     Corridor,
     CourseCoordinate,
-    CourseMeasure,
     DirectionAt,
     DiscAt,
     DiscreteRange,
@@ -34,6 +33,7 @@ from scenicq.forest.nodes import (
     Intersects,
     LaneCourse,
     Logic,
+    Measure,
     Node,
     Norm,
     Normal,
@@ -175,7 +175,7 @@ class Expressions:
             case Bearing():
                 x, y = cast(TermVector, args[0])
                 return apply(Operator.ATAN2, apply(Operator.NEG, x), y)
-            case CourseCoordinate() | CourseMeasure() | LaneCourse() | Corridor():
+            case CourseCoordinate() | Measure() | LaneCourse() | Corridor():
                 raise UnsupportedError("a course that hangs on what no label shows")
             case Among():
                 raise UnsupportedError("a condition on other label objects that hangs on what no label shows")

@@ -18,12 +18,12 @@ from scenicq.forest.nodes import (
     Constant,
     Coordinate,
     CourseCoordinate,
-    CourseMeasure,
     Feature,
     Identity,
     Index,
     LaneCourse,
     Logic,
+    Measure,
     Node,
 )
 from scenicq.forest.scenario import Scenario
@@ -75,7 +75,7 @@ def shape_of(group: Group, ego: int, tolerance: Tolerance) -> GroupShape:
                 own = (id(node.body), node.op, node.category, node.number, node.excluded)
             case CourseCoordinate():
                 own = node.axis, node.end
-            case CourseMeasure():
+            case Measure():
                 own = node.measure, node.seconds, node.end
             case LaneCourse():
                 own = id(node.network), node.gap_s

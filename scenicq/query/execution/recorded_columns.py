@@ -33,6 +33,7 @@ __all__ = [
     "is_cell",
     "read_cells",
     "recorded_struct",
+    "show_cell",
     "struct_of_row",
 ]
 
@@ -104,6 +105,21 @@ def _kind(value: CellRecord) -> ColumnKind | None:
             return "vector"
         case _:
             return "number"
+
+
+def show_cell(value: CellRecord) -> str:
+    """A recorded value for people."""
+    match value:
+        case None:
+            return "-"
+        case bool():
+            return "yes" if value else "no"
+        case str():
+            return value
+        case tuple():
+            return f"({', '.join(f'{each:z.2f}' for each in value)})"
+        case _:
+            return f"{value:z.3g}"
 
 
 # --- CSV
