@@ -29,6 +29,7 @@ __all__ = [
     "course",
     "course_change",
     "deceleration_to_avoid",
+    "hides",
     "jerk",
     "post_encroachment_time",
     "time_headway",
@@ -102,6 +103,19 @@ def box_distance(one: Any, other: Any) -> Any:
     return _sampled(lambda a, b: float(_box(a).distance(_box(b))))(one, other)
 
 
+def hides(screen: Any, thing: Any, viewer: Any = None, *, whole: bool = False) -> Any:
+    """Whether the box of an object covers the line from a viewer to the centre of another.
+
+    Args:
+        screen: What may be in the way.
+        thing: What is behind it.
+        viewer: Who looks, from the centre; the ego by default.
+        whole: Whether it covers all lines, to all of the box of the other.
+    """
+    seer = import_module("scenic.syntax.veneer").ego() if viewer is None else viewer
+    return _sampled(_hides)(screen, thing, seer, whole)
+
+
 def jerk(owner: Any) -> Any:
     """The slope of the acceleration of an object, m/s³: 0 in a scene of one instant, in which nothing changes."""
     return _sampled(lambda _: 0.0)(owner)
@@ -126,6 +140,12 @@ def _time_to_collision(one: Any, other: Any) -> float:
         for each in (one, other)
     ]
     return float(measures.time_to_collision(*boxes))
+
+
+def _hides(screen: Any, thing: Any, viewer: Any, whole: bool) -> bool:
+    line = import_module("shapely.geometry").LineString
+    ends = _box(thing).exterior.coords[:4] if whole else [_xy(thing)]
+    return all(_box(screen).intersects(line([_xy(viewer), end])) for end in ends)
 
 
 def _time_headway(one: Any, other: Any) -> float:

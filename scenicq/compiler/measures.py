@@ -37,12 +37,15 @@ __all__ = [
     "box_distance",
     "course_change",
     "deceleration_to_avoid",
+    "hides",
     "jerk",
     "post_encroachment_time",
     "time_headway",
     "time_to_collision",
 ]
 
+_LINE_M = 1e-6
+"""How wide a line of sight is."""
 _ZERO, _HALF, _TWO, _NEVER = (build.constant(value) for value in (0.0, 0.5, 2.0, NEVER))
 
 
@@ -90,6 +93,29 @@ def box_distance(_run: Interpreter, span: Span, one: ModelValue, other: ModelVal
         for corner in far.corners()
     ]
     return Select(Intersects(*areas, span=span), (_extreme(ArithmeticOp.MIN, ways), _ZERO), span=span)
+
+
+def hides(
+    run: Interpreter, span: Span, screen: ModelValue, thing: ModelValue, viewer: ModelValue = None, *,
+    whole: ModelValue = False,
+) -> Node:  # fmt: skip
+    """Whether the box of an object covers the line from a viewer to the centre of another, or to all of its box."""
+    if not isinstance(whole, bool):
+        raise fail("wrong-type", "`whole` is True or False", span, f"this is {describe(whole)}")
+    seer = run.ego(span) if viewer is None else viewer
+    cover, target, eye = (_Seen(each, "hides", span) for each in (screen, thing, seer))
+    area = object_box(cover.instance, span)
+    # what lies behind a box is convex, so that the corners tell of all of another
+    ends = target.corners() if whole else [target.position]
+    covered = [Intersects(area, _line(eye.position, end, span), span=span) for end in ends]
+    return covered[0] if len(covered) == 1 else build.logic(LogicOp.AND, *covered, span=span)
+
+
+def _line(start: Node, end: Node, span: Span) -> Node:
+    """A line between two points, as a box that is hardly wide."""
+    way = build.vector_difference(end, start)
+    middle = build.vector_sum(start, build.scale(way, _HALF))
+    return build.box(middle, build.bearing(way), build.constant(_LINE_M), build.norm(way), span)
 
 
 def jerk(run: Interpreter, span: Span, owner: ModelValue) -> Node:

@@ -309,3 +309,41 @@ def test_real_scenic_is_told_the_same(monkeypatch):
     assert for_scenic.deceleration_to_avoid(front, back) == 0
     assert (for_scenic.jerk(back), for_scenic.course_change(back, 3)) == (0, 0)
     assert street().lanes
+
+
+def test_what_is_hidden_is_behind_a_box(tmp_path):
+    draw, seen, labels = random.Random(8), Counter[str](), []
+    for n in range(60):
+        ego = LabelObject("ego", "Car", "car", 0.0, 0.0, 0.0, 2.0, 4.0)
+        screen = LabelObject("s", "Car", "car", draw.uniform(-6, 6), draw.uniform(4, 7), draw.uniform(-3, 3), 2.0, 4.5)
+        thing = LabelObject("w", "Pedestrian", "walker", draw.uniform(-6, 6), draw.uniform(10, 14), 0.3, 0.6, 0.6)
+        labels.append(Label(f"f{n:02}", f"r{n:02}", n, "m", ego, (screen, thing)))
+    write_dataset(tmp_path / "d", [Recording(each.recording, "m", (each,)) for each in labels], {}, name="d")
+    dataset = open_dataset(tmp_path / "d")
+    text = f"""model scenic.domains.driving.model
+from scenicq.labels import hides
+ego = new Car {PLACE}
+s = new Car {PLACE}
+w = new Pedestrian {PLACE}
+record hides(s, w) as middle
+record hides(s, w, whole=True) as whole
+record hides(w, s, viewer=s) as itself
+"""
+    every = {each.frame: each for each in Query(dataset, Source("p.scenic", text), QueryOptions()).results()}
+    for method in ("auto", "smt"):
+        asked = QueryOptions(match=MatchOptions(method=method))
+        found = {
+            each.frame for each in Query(dataset, Source("p.scenic", f"{text}require hides(s, w)\n"), asked).results()
+        }
+        assert found == {frame for frame, each in every.items() if each.recorded["middle"].values[0]}
+    for label in labels:
+        screen, thing = label.objects
+        told = {name: each.values[0] for name, each in every[label.frame].recorded.items()}
+        area = box(screen)
+        assert told["middle"] is area.intersects(LineString([(0, 0), (thing.x, thing.y)]))
+        # of all of its box, points along its sides and inside
+        edge = [box(thing).exterior.interpolate(at / 12) for at in range(29)]
+        assert told["whole"] is all(area.intersects(LineString([(0, 0), point])) for point in edge)
+        assert told["itself"] is False
+        seen[f"{told['middle']} {told['whole']}"] += 1
+    assert min(seen[each] for each in ("True True", "True False", "False False")) > 2, seen
