@@ -100,7 +100,7 @@ def deceleration_to_avoid(one: Any, other: Any) -> Any:
 
 def box_distance(one: Any, other: Any) -> Any:
     """Metres between the boxes of two objects; 0 where they touch."""
-    return _sampled(lambda a, b: float(_box(a).distance(_box(b))))(one, other)
+    return _sampled(_box_distance)(one, other)
 
 
 def hides(screen: Any, thing: Any, viewer: Any = None, *, whole: bool = False) -> Any:
@@ -118,12 +118,12 @@ def hides(screen: Any, thing: Any, viewer: Any = None, *, whole: bool = False) -
 
 def jerk(owner: Any) -> Any:
     """The slope of the acceleration of an object, m/s³: 0 in a scene of one instant, in which nothing changes."""
-    return _sampled(lambda _: 0.0)(owner)
+    return _sampled(_unchanged)(owner)
 
 
 def course_change(owner: Any, seconds: Any) -> Any:
     """How far an object's course turns to the left in the next seconds, radians; 0 in a scene of one instant."""
-    return _sampled(lambda _, __: 0.0)(owner, seconds)
+    return _sampled(_unchanged)(owner, seconds)
 
 
 def post_encroachment_time(one: Any, other: Any) -> Any:
@@ -131,7 +131,7 @@ def post_encroachment_time(one: Any, other: Any) -> Any:
 
     Allen, Shin and Cooper, *Analysis of traffic conflicts and collisions*, 1978. 0 where both are there at once.
     """
-    return _sampled(lambda a, b: 0.0 if _box(a).intersects(_box(b)) else NEVER)(one, other)
+    return _sampled(_post_encroachment_time)(one, other)
 
 
 def _time_to_collision(one: Any, other: Any) -> float:
@@ -146,6 +146,18 @@ def _hides(screen: Any, thing: Any, viewer: Any, whole: bool) -> bool:
     line = import_module("shapely.geometry").LineString
     ends = _box(thing).exterior.coords[:4] if whole else [_xy(thing)]
     return all(_box(screen).intersects(line([_xy(viewer), end])) for end in ends)
+
+
+def _box_distance(one: Any, other: Any) -> float:
+    return float(_box(one).distance(_box(other)))
+
+
+def _unchanged(*_: Any) -> float:
+    return 0.0
+
+
+def _post_encroachment_time(one: Any, other: Any) -> float:
+    return 0.0 if _box(one).intersects(_box(other)) else NEVER
 
 
 def _time_headway(one: Any, other: Any) -> float:

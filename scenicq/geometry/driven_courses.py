@@ -181,7 +181,7 @@ class TrackStretch:
     @cached_property
     def is_boxed(self) -> NDArray[np.bool_]:
         """At which samples the box is known."""
-        return ~np.isnan(self.places[:, :5]).any(axis=1)
+        return cast("NDArray[np.bool_]", ~np.isnan(self.places[:, :5]).any(axis=1))
 
     @cached_property
     def boxes(self) -> NDArray[np.object_]:

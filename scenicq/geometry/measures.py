@@ -95,7 +95,7 @@ def _course_change(courses: tuple[CoursePlace, ...], seconds: float) -> Ends:
     if own.stretch is None:
         return unknown
     times = own.stretch.times_s
-    later = int(np.searchsorted(times, times[own.sample] + seconds - 1e-6))
+    later = int(np.count_nonzero(times < times[own.sample] + seconds - 1e-6))
     if later >= len(times):
         return unknown
     directions = own.stretch.directions

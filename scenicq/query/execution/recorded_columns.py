@@ -87,10 +87,13 @@ def columns_of_records(records: Iterable[Record]) -> tuple[RecordedColumn, ...]:
             series = isinstance(value, SeriesRecord)
             seen = {_kind(each) for each in (value.values if isinstance(value, SeriesRecord) else [value])} - {None}
             kinds.setdefault(name, (set(), series))[0].update(cast("set[ColumnKind]", seen))
-    return tuple(
-        RecordedColumn(name, next(iter(found or {"number"})) if len(found) < 2 else "text", series)
-        for name, (found, series) in kinds.items()
-    )
+    return tuple(RecordedColumn(name, _common(found), series) for name, (found, series) in kinds.items())
+
+
+def _common(kinds: set[ColumnKind]) -> ColumnKind:
+    """The kind of a column with values of some kinds; numbers where there is none."""
+    one: ColumnKind = next(iter(kinds), "number")
+    return one if len(kinds) < 2 else "text"
 
 
 def _kind(value: CellRecord) -> ColumnKind | None:

@@ -213,7 +213,10 @@ class _Stretches:
         """What is read at these samples, each from the start of its result."""
         sizes = self.sizes[self.numbers]
         begins = np.cumsum(sizes) - sizes
-        chosen = np.concatenate([np.arange(self.starts[n], self.starts[n] + self.sizes[n]) for n in self.numbers])
+        begin_of, size_of = self.starts.tolist(), self.sizes.tolist()
+        chosen: NDArray[np.int64] = np.concatenate(
+            [np.arange(begin_of[n], begin_of[n] + size_of[n], dtype=np.int64) for n in self.numbers]
+        )
         return AtomColumns(scenario, self.samples.at(chosen), start=np.repeat(begins, sizes))
 
     def told(

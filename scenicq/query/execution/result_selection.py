@@ -11,7 +11,7 @@ import heapq
 import operator
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import cast
+from typing import Any, cast
 
 from scenicq.errors import DataError, Diagnostic, ScenarioError, Source, Span, similar
 from scenicq.match.verdict import Match
@@ -23,7 +23,7 @@ from scenicq.syntax.parser import parse
 
 __all__ = ["ResultSelection", "SortKey", "WhereCondition", "read_sort", "read_where"]
 
-_COMPARE: dict[str, Callable[[object, object], bool]] = {
+_COMPARE: dict[str, Callable[[Any, Any], bool]] = {
     "==": operator.eq, "!=": operator.ne, "<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge,
 }  # fmt: skip
 _NUMBERS = ("minimum", "maximum", "mean")
