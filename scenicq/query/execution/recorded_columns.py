@@ -92,8 +92,10 @@ def columns_of_records(records: Iterable[Record]) -> tuple[RecordedColumn, ...]:
 
 def _common(kinds: set[ColumnKind]) -> ColumnKind:
     """The kind of a column with values of some kinds; numbers where there is none."""
-    one: ColumnKind = next(iter(kinds), "number")
-    return one if len(kinds) < 2 else "text"
+    if len(kinds) > 1:
+        return "text"
+    (one,) = kinds or {cast(ColumnKind, "number")}
+    return one
 
 
 def _kind(value: CellRecord) -> ColumnKind | None:
