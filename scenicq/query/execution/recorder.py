@@ -6,10 +6,11 @@ on a hidden random variable is that of the witness. Where there is none, it is N
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import groupby
+from itertools import groupby, product
 from typing import cast
 
 import numpy as np
@@ -18,10 +19,13 @@ from numpy.typing import NDArray
 from scenicq.budget import look
 from scenicq.forest.columns import DEFINED, UNDEFINED, value_reader
 from scenicq.forest.compute import CannotEvaluate
-from scenicq.forest.nodes import Identity, Node, Value
+from scenicq.forest.kinds import kind_of
+from scenicq.forest.nodes import Identity, Kind, Node, Value
 from scenicq.forest.scenario import RecordedValue, Scenario
 from scenicq.forest.walk import features, leaves
+from scenicq.limits import LIMITS
 from scenicq.match.options import MatchOptions
+from scenicq.match.problem.conditioned import options_of
 from scenicq.match.verdict import Match, WitnessValue
 from scenicq.query.execution.results import Recorded, RecordedCell, Result
 from scenicq.store.dataset import Dataset
@@ -132,11 +136,11 @@ class Recorder:
             for each in self.scenario.records:
                 look()
                 value = columns.expanded(each.value)
-                if leaves(value):
+                marks = {leaf.span.mark for leaf in leaves(value) if leaf.span is not None}
+                if any(not marks.isdisjoint(_proof(placed[number])) for number in numbers):
                     for number in numbers:
                         alone = _Stretches(samples, starts, sizes, [number])
-                        witness = cast(Match, placed[number].result.verdict).witness
-                        given = alone.columns(self.scenario).assigned(_assignment(value, witness))
+                        given = alone.columns(self.scenario).assigned(_assignment(value, _proof(placed[number])))
                         found[number][each.name] = next(alone.told(each, *_values(given, value)))
                 else:
                     for number, told in zip(numbers, own.told(each, *_values(columns, value)), strict=True):
@@ -234,8 +238,42 @@ class _Stretches:
             begin += size
 
 
+def _proof(placed: _Placed) -> Mapping[str, WitnessValue]:
+    return cast(Match, placed.result.verdict).witness
+
+
 def _values(columns: AtomColumns, value: Node) -> tuple[list[RecordedCell], list[str]]:
-    """A value at each sample, None where there is none, and the reason for that."""
+    """A value at each sample, None where there is none, and the reason for that.
+
+    What hangs on a choice without a value, such as which of several lanes is meant, is known where all options that
+    there are agree.
+    """
+    size, found = len(columns.samples), list[tuple[list[RecordedCell], list[str]]]()
+    choices = [leaf for leaf in leaves(value) if leaf.identity not in columns.assignment]
+    options = [options_of(leaf) for leaf in choices]
+    known = [each for each in options if each is not None]
+    if len(known) < len(options) or math.prod(map(len, known)) > LIMITS.outcomes_over_time:
+        return [None] * size, [_CHANCE] * size
+    for picked in product(*known):
+        look()
+        given = dict(zip((leaf.identity for leaf in choices), map(float, picked), strict=True))
+        found.append(_with_choices(columns.assigned({**columns.assignment, **given}) if given else columns, value))
+    if len(found) == 1:
+        return found[0]
+    told = [_agreed(each) for each in zip(*(zip(*each, strict=True) for each in found), strict=True)]
+    return [cell for cell, _ in told], [reason for _, reason in told]
+
+
+def _agreed(outcomes: Sequence[tuple[RecordedCell, str]]) -> tuple[RecordedCell, str]:
+    """The value in which options agree, those left out that are not there."""
+    there = {each for each in outcomes if each[1] != _NO_VALUE}
+    if len(there) == 1:
+        return there.pop()
+    return None, _CHANCE if there else _NO_VALUE
+
+
+def _with_choices(columns: AtomColumns, value: Node) -> tuple[list[RecordedCell], list[str]]:
+    """As `_values`, all choices made."""
     size = len(columns.samples)
     try:
         column, several = columns.with_first_directions(value)
@@ -246,17 +284,20 @@ def _values(columns: AtomColumns, value: Node) -> tuple[list[RecordedCell], list
     status = np.broadcast_to(column.status, size)
     reasons = np.where(status == DEFINED, "", np.where(status == UNDEFINED, _NO_VALUE, _NOT_OBSERVED)).astype(object)
     reasons[(status == DEFINED) & several] = _SEVERAL
-    read = value_reader(column.data, (size,)) if (reasons == "").any() else None
+    read, kind = value_reader(column.data, (size,)) if (reasons == "").any() else None, kind_of(value)
     cells: list[RecordedCell] = []
     for place, reason in enumerate(reasons.tolist()):
-        cell = None if reason or read is None else _cell(read(place))
+        cell = None if reason or read is None else _cell(read(place), kind)
         if cell is None and not reason:
             reasons[place] = _NO_VALUE
         cells.append(cell)
     return cells, reasons.tolist()
 
 
-def _cell(value: Value) -> RecordedCell:
+def _cell(value: Value, kind: Kind) -> RecordedCell:
+    if kind == "boolean" and isinstance(value, float):
+        # beside options that are not there, truth values are numbers
+        return bool(value)
     if isinstance(value, bool | str) or (isinstance(value, float) and np.isfinite(value)):
         return value
     if isinstance(value, tuple) and bool(np.isfinite(value).all()):

@@ -144,3 +144,28 @@ def test_what_is_unknown_carries_nothing(made):
     (found,) = results(dataset, text, every=True)
     assert not isinstance(found.verdict, Match)
     assert found.recorded is None
+
+
+def test_a_choice_of_lanes_is_known_where_they_agree(made):
+    """On the street a lane leads to several ways through the intersection, which overlap there."""
+    network = street()
+    (x, y), *_ = [
+        (at.x, at.y)
+        for lane in network.lanes
+        for at in [lane.polygon.representative_point()]
+        if len(network.lanesAt(at.x, at.y)) > 1
+    ]
+    assert len(network.lanesAt(1.75, 70.0)) == 1
+    dataset = made(
+        [label("f0", "r", 0, [other("a", 1.75, 70.0)], "street"), label("f1", "r", 1, [other("a", x, y)], "street")],
+        {"street": network.features},
+    )
+    text = HEAD + (
+        "model scenic.domains.driving.model\n"
+        "record c.position in network.laneAt(c) as inside\nrecord network.laneAt(c) is network.laneAt(ego) as same\n"
+        "record c.position in network.laneAt(ego) as behind\n"
+    )
+    first, second = results(dataset, text)
+    told = [{name: each.values[0] for name, each in found.recorded.items()} for found in (first, second)]
+    assert told[0] == {"inside": True, "same": True, "behind": True}
+    assert told[1] == {"inside": True, "same": False, "behind": False}
