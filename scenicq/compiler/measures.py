@@ -179,10 +179,6 @@ class _Seen:
         ]
 
 
-def _abs(node: Node) -> Node:
-    return build.arithmetic(ArithmeticOp.ABS, node)
-
-
 def _times(left: Node, right: Node) -> Node:
     return build.arithmetic(ArithmeticOp.MUL, left, right)
 
