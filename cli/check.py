@@ -82,9 +82,10 @@ def _told(scenario: Scenario) -> str:
     roles = ", ".join(f"{owner.name}: {owner.category}" for owner in scenario.objects)
     written = sum(requirement.built_in is None for requirement in scenario.requirements)
     soft = f" and {len(scenario.soft)} soft" if scenario.soft else ""
+    recorded = f", {count(len(scenario.records), 'recorded value')}" if scenario.records else ""
     return (
         f"ok on map {scenario.map}: {count(len(scenario.objects), 'object')} ({roles}), "
-        f"{count(written, 'requirement')}{soft}, read as Scenic {scenario.version}"
+        f"{count(written, 'requirement')}{soft}{recorded}, read as Scenic {scenario.version}"
     )
 
 

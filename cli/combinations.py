@@ -26,6 +26,9 @@ _EXCLUDES = {
     ("shard", "rank"): "",
     ("shard", "sample"): "",
     ("shard", "advise"): "",
+    ("shard", "where"): "",
+    ("shard", "sort"): "",
+    ("rank", "sort"): "",
 }
 """Two options that cannot be had together, and what to do instead."""
 

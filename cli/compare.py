@@ -33,7 +33,8 @@ def report(before: Path, after: Path, *, every: bool, output: Path | None) -> No
     """Say which matches came, went and stayed between two result files.
 
     This shows what a changed line of a program did. With `match --all` the files also say why a frame does not match.
-    What one leaves open (a frame that is unknown, or that --limit, --deadline or --sample left out) is undecided.
+    What one leaves open (a frame that is unknown, or that --limit, --deadline, --sample or --where left out) is
+    undecided.
     """
     old, new = read_results(before), read_results(after)
     doubt = check_datasets(old.records, new.records)

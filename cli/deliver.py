@@ -95,6 +95,7 @@ def _deliver(
                 sink,
                 query.roles,
                 query.dataset.short_names,
+                query.recorded_columns,
                 origin=origin,
                 ranked=wanted.ranked,
                 over_time=query.is_over_time(),
@@ -158,4 +159,7 @@ def exit_code(funnel: Funnel, summary: ResultSummary | None) -> int:
     """
     if funnel.unknowns or (summary is not None and summary.skipped):
         return UNDECIDED
-    return 0 if funnel.matches else NOTHING
+    chosen = funnel.chosen
+    if chosen is not None and chosen.unclear:
+        return UNDECIDED
+    return 0 if (funnel.matches if chosen is None else chosen.shown) else NOTHING

@@ -14,7 +14,16 @@ from msgspec import UNSET, structs
 
 from scenicq.errors import plain_json
 from scenicq.query.execution.csv_cells import SPREADSHEET_MARK, quote_cell
-from scenicq.query.execution.records import DENSITY, FrameRecord, IntervalRecord, Record, SummaryRecord, json_text
+from scenicq.query.execution.recorded_columns import RecordedColumn, cells_of_row
+from scenicq.query.execution.records import (
+    DENSITY,
+    RECORDED,
+    FrameRecord,
+    IntervalRecord,
+    Record,
+    SummaryRecord,
+    json_text,
+)
 from scenicq.query.execution.result_summary import ResultSummary
 from scenicq.query.execution.result_tables import result_schema, result_table, summary_metadata
 from scenicq.store.frame_names import ShortNames
@@ -131,14 +140,20 @@ class _JsonLines:
 class _Csv:
     """A row a result, with a column a field; nested values and truth values are JSON."""
 
-    def __init__(self, text: TextStream, names: tuple[str, ...], *, spreadsheet: bool) -> None:
-        self._text, self._names = text, names
-        self._rows = CsvRows(text, names, spreadsheet=spreadsheet)
+    def __init__(
+        self, text: TextStream, names: tuple[str, ...], recorded: Sequence[RecordedColumn], *, spreadsheet: bool
+    ) -> None:
+        self._text, self._names, self._recorded = text, names, recorded
+        own = {"recorded": tuple(cell for each in recorded for cell in each.cells)}
+        self._rows = CsvRows(text, [cell for name in names for cell in own.get(name, (name,))], spreadsheet=spreadsheet)
 
     def write(self, record: Record | SummaryRecord) -> None:
         cells = {name: getattr(record, name, UNSET) for name in self._names}
+        recorded: dict[str, str | None] = {}
         if not isinstance(record, SummaryRecord):
             cells["cause"] = cells["cause"] or {}
+            recorded = cells_of_row(record, self._recorded)
+        cells.pop("recorded", None)
         self._rows.write(
             {
                 name: None
@@ -148,16 +163,19 @@ class _Csv:
                 else plain_json(json_text(cell))
                 for name, cell in cells.items()
             }
+            | {name: None if cell is None else plain_json(cell) for name, cell in recorded.items()}
         )
         self._text.flush()
 
 
 class _Parquet:
-    def __init__(self, sink: BinaryIO, roles: Sequence[str], origin: str, *, ranked: bool, over_time: bool,
-                 every: bool) -> None:  # fmt: skip
+    def __init__(self, sink: BinaryIO, roles: Sequence[str], origin: str, recorded: Sequence[RecordedColumn], *,
+                 ranked: bool, over_time: bool, every: bool) -> None:  # fmt: skip
         import pyarrow.parquet as pq  # noqa: PLC0415 - takes long to load
 
-        self._schema = result_schema(roles, origin=origin, ranked=ranked, over_time=over_time, every=every)
+        self._schema = result_schema(
+            roles, origin=origin, ranked=ranked, over_time=over_time, every=every, recorded=recorded
+        )
         self._file = pq.ParquetWriter(sink, self._schema)
         self._rows: list[Record] = []
 
@@ -185,6 +203,7 @@ def make_writer(
     sink: BinaryIO,
     roles: Callable[[], Sequence[str]],
     shorten: Callable[[], ShortNames] | None = None,
+    recorded: Callable[[], Sequence[RecordedColumn]] = tuple,
     *,
     origin: str = "",
     ranked: bool = False,
@@ -198,23 +217,26 @@ def make_writer(
         sink: Where to; it stays open.
         roles: Gives the roles that results may name; asked where they are columns.
         shorten: Gives what cuts names short; asked where a table would not fit the terminal.
+        recorded: Gives what the program records; asked where that is columns.
         origin: The dataset that the results come from; "" where it is not known.
         ranked: Whether results have a density.
         over_time: Whether the results are intervals.
         every: Whether each correspondence by which a frame matches is a result.
     """
     if name == "parquet":
-        return _Parquet(sink, roles(), origin, ranked=ranked, over_time=over_time, every=every)
+        return _Parquet(sink, roles(), origin, recorded(), ranked=ranked, over_time=over_time, every=every)
     text = TextStream(sink)
     match name:
         case "table":
             return Table(text, shorten, over_time=over_time)
         case "csv" | "spreadsheet":
+            columns = recorded()
             absent = {"all_matches": every, "dataset": bool(origin), **dict.fromkeys(DENSITY, ranked)}
+            absent |= dict.fromkeys(RECORDED, bool(columns))
             left_out = {name for name, there in absent.items() if not there}
             kind = IntervalRecord if over_time else FrameRecord
             names = tuple(name for name in kind.__struct_fields__ if name not in left_out)
-            return _HeldBack(text, _Csv(text, names, spreadsheet=name == "spreadsheet").write)
+            return _HeldBack(text, _Csv(text, names, columns, spreadsheet=name == "spreadsheet").write)
         case "ids":
             return _Names(text)
         case _:

@@ -30,8 +30,23 @@ def _steps(query: Query) -> list[tuple[str, str]]:
         (f"{funnel.candidates:,}", filtered),
         *(_over_time(funnel) or [(f"{funnel.with_roles:,}", "with a label object for every role")]),
         (f"{funnel.matches:,}", matches),
+        *_chosen(funnel),
         (f"{funnel.unknowns:,}", f"{unknown}{f': {reasons}' if reasons else ''}"),
     ]
+
+
+def _chosen(funnel: Funnel) -> list[tuple[str, str]]:
+    """How many of the matches are shown, where that is a matter of what they carry."""
+    chosen = funnel.chosen
+    if chosen is None:
+        return []
+    rows = [(f"{chosen.shown:,}", "of these shown")]
+    if chosen.where:
+        unclear = f", {chosen.unclear:,} of which it is not known" if chosen.unclear else ""
+        rows.append((f"{chosen.others + chosen.unclear:,}", f"left out by --where{unclear}"))
+    if chosen.beyond:
+        rows.append((f"{chosen.beyond:,}", "behind the limit of --sort"))
+    return rows
 
 
 def _over_time(funnel: Funnel) -> list[tuple[str, str]]:
@@ -71,6 +86,9 @@ def show_funnel(query: Query, elapsed_s: float, told: Collection[Diagnostic]) ->
     lines += [*_failures(query.funnel), *_broken(query.funnel)]
     for what, frames in sorted(query.funnel.missing.items()):
         lines.append(f"  `{what}` is missing in {count(frames, 'frame')} of the dataset, and not compared there")
+    for what, number in sorted(query.funnel.unrecorded.items()):
+        name, _, reason = what.rpartition(": ")
+        lines.append(f"  `{name}` is recorded as null {count(number, 'time')}: {reason}")
     waived = [requirement.value for requirement in BuiltIn if requirement not in query.options.match.enforce]
     if waived:
         lines.append(f"  waived: {', '.join(waived)} (see --enforce)")

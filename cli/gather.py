@@ -10,6 +10,7 @@ from scenicq.exporters.forms import FORMS
 from scenicq.query.execution.partitions import Gathered
 from scenicq.query.execution.partitions import gather as find_pieces
 from scenicq.query.execution.question_notes import noted_question
+from scenicq.query.execution.recorded_columns import columns_of_records
 from scenicq.query.execution.records import FrameRecord, IntervalRecord, read_record
 from scenicq.query.execution.result_tables import roles_of
 
@@ -66,8 +67,9 @@ def _write(gathered: Gathered, file: Path | None, form: str) -> None:
         first = next(gathered.records(), None)
         origin, over_time = (first and first.dataset) or "", isinstance(first, IntervalRecord)
         every = isinstance(first, FrameRecord) and first.all_matches is True
-        writer = make_writer(form, sink, lambda: roles_of(gathered.records()), origin=origin, over_time=over_time,
-                             every=every)  # fmt: skip
+        writer = make_writer(form, sink, lambda: roles_of(gathered.records()),
+                             recorded=lambda: columns_of_records(gathered.records()), origin=origin,
+                             over_time=over_time, every=every)  # fmt: skip
         for each in gathered.records():
             writer.write(each)
         writer.finish(gathered.summary)

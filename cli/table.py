@@ -10,7 +10,8 @@ from typing import IO, BinaryIO, cast
 import click
 from msgspec import UNSET
 
-from scenicq.query.execution.records import CauseRecord, IntervalRecord, Record
+from scenicq.query.execution.recorded_columns import show_cell
+from scenicq.query.execution.records import CauseRecord, CellRecord, IntervalRecord, Record, SeriesRecord
 from scenicq.query.execution.result_summary import ResultSummary
 from scenicq.store.frame_names import ShortNames
 
@@ -216,7 +217,7 @@ def _cells(record: Record) -> Row:
     elif record.log_density is not UNSET and record.verdict == "match":
         why = f"no density ({record.no_density})"
     else:
-        why = cause.reason or (cause.detail if near else cause.what)
+        why = cause.reason or (cause.detail if near else cause.what) or _recorded(record)
     objects = [f"{role}={label}" for role, label in record.correspondence.items() if (role, label) != ("ego", "ego")]
     verdict = f"{record.verdict}: {why}" if why else record.verdict
     if isinstance(record, IntervalRecord):
@@ -237,3 +238,18 @@ def _cells(record: Record) -> Row:
         " ".join(objects) or "-",
         sensors[0][1] if sensors else "-",
     )
+
+
+def _recorded(record: Record) -> str:
+    """What a match carries, in short; over an interval from the least to the greatest."""
+    return ", ".join(f"{name} {_short(value)}" for name, value in (record.recorded or {}).items())
+
+
+def _short(value: CellRecord | SeriesRecord) -> str:
+    match value:
+        case SeriesRecord(minimum=int() | float() as least, maximum=int() | float() as most):
+            return f"{show_cell(least)} to {show_cell(most)}"
+        case SeriesRecord():
+            return f"{show_cell(value.first)} ... {show_cell(value.last)}"
+        case _:
+            return show_cell(value)

@@ -50,6 +50,7 @@ CODES: dict[str, str] = {
     "unsupported-construct": "Scenic, but not part of what can be matched",
     "unsupported-region": "a region of a kind that cannot be used here",
     "soft-requirement": "a requirement that need not hold, so that it excludes nothing",
+    "not-recorded": "a value that the program records and no result can carry",
     "impossible-requirement": "a requirement that no scene satisfies",
     "budget-exceeded": "the program takes too many steps or too much memory",
     "runtime-error": "evaluating the program failed",

@@ -1,4 +1,4 @@
-"""`along`, `beside`, `course` and `corridor` where real Scenic runs a program: the module that Python finds.
+"""Courses and measures where real Scenic runs a program: the module that Python finds.
 
 Scenicq itself reads `from scenicq.labels import ...` without running this. Scenic draws scenes of one instant, in which
 nothing has a track: a course is that of the lane, as of a label that is seen once
@@ -14,11 +14,28 @@ from functools import cached_property
 from importlib import import_module
 from typing import Any, cast
 
+from scenicq.geometry import measures
+from scenicq.geometry.boxes import box_polygon
 from scenicq.geometry.driven_courses import CoursePlace, lane_course
+from scenicq.geometry.measures import NEVER, STANDING_MPS, MovingBoxes
 from scenicq.geometry.network import Network
 from scenicq.geometry.regions import PolylineSet
 
-__all__ = ["along", "beside", "corridor", "course"]
+__all__ = [
+    "along",
+    "beside",
+    "box_distance",
+    "corridor",
+    "course",
+    "course_change",
+    "deceleration_to_avoid",
+    "hides",
+    "jerk",
+    "post_encroachment_time",
+    "time_headway",
+    "time_to_collision",
+]
+
 
 _MAP_SLACK_M = (1e-9, 0.05)
 
@@ -53,6 +70,112 @@ def course(owner: Any) -> Any:
 def corridor(owner: Any, half_width: Any) -> Any:
     """What lies within so many metres of the course of an object, as one of Scenic's regions."""
     return _sampled(_corridor)(owner, half_width)
+
+
+def time_to_collision(one: Any, other: Any) -> Any:
+    """Seconds until the boxes of two objects touch, if both go on with their velocities and do not turn.
+
+    Hayward, *Near-miss determination through use of a scale of danger*, 1972. 0 where they touch; what never comes is
+    `NEVER`, a million.
+    """
+    return _sampled(_time_to_collision)(one, other)
+
+
+def time_headway(one: Any, other: Any) -> Any:
+    """Seconds until the front of an object is where that of another is now, along its course at its speed.
+
+    Vogel, *A comparison of headway and time to collision as safety indicators*, 2003. `NEVER` where the other is not
+    ahead, or the first stands.
+    """
+    return _sampled(_time_headway)(one, other)
+
+
+def deceleration_to_avoid(one: Any, other: Any) -> Any:
+    """The constant deceleration, m/s², with which an object just does not hit another that drives ahead on its course.
+
+    Cooper and Ferguson, *Traffic studies at T-junctions*, 1976. 0 where it is not faster, or the other not ahead.
+    """
+    return _sampled(_deceleration_to_avoid)(one, other)
+
+
+def box_distance(one: Any, other: Any) -> Any:
+    """Metres between the boxes of two objects; 0 where they touch."""
+    return _sampled(_box_distance)(one, other)
+
+
+def hides(screen: Any, thing: Any, viewer: Any = None, *, whole: bool = False) -> Any:
+    """Whether the box of an object covers the line from a viewer to the centre of another.
+
+    Args:
+        screen: What may be in the way.
+        thing: What is behind it.
+        viewer: Who looks, from the centre; the ego by default.
+        whole: Whether it covers all lines, to all of the box of the other.
+    """
+    seer = import_module("scenic.syntax.veneer").ego() if viewer is None else viewer
+    return _sampled(_hides)(screen, thing, seer, whole)
+
+
+def jerk(owner: Any) -> Any:
+    """The slope of the acceleration of an object, m/s³: 0 in a scene of one instant, in which nothing changes."""
+    return _sampled(_unchanged)(owner)
+
+
+def course_change(owner: Any, seconds: Any) -> Any:
+    """How far an object's course turns to the left in the next seconds, radians; 0 in a scene of one instant."""
+    return _sampled(_unchanged)(owner, seconds)
+
+
+def post_encroachment_time(one: Any, other: Any) -> Any:
+    """Seconds between two objects at a place that both cover; in a scene of one instant `NEVER`.
+
+    Allen, Shin and Cooper, *Analysis of traffic conflicts and collisions*, 1978. 0 where both are there at once.
+    """
+    return _sampled(_post_encroachment_time)(one, other)
+
+
+def _time_to_collision(one: Any, other: Any) -> float:
+    boxes = [
+        MovingBoxes(_xy(each), each.heading, _xy(each.velocity), each.width, each.length)  # pyright: ignore[reportArgumentType]
+        for each in (one, other)
+    ]
+    return float(measures.time_to_collision(*boxes))
+
+
+def _hides(screen: Any, thing: Any, viewer: Any, whole: bool) -> bool:
+    line = import_module("shapely.geometry").LineString
+    ends = _box(thing).exterior.coords[:4] if whole else [_xy(thing)]
+    return all(_box(screen).intersects(line([_xy(viewer), end])) for end in ends)
+
+
+def _box_distance(one: Any, other: Any) -> float:
+    return float(_box(one).distance(_box(other)))
+
+
+def _unchanged(*_: Any) -> float:
+    return 0.0
+
+
+def _post_encroachment_time(one: Any, other: Any) -> float:
+    return 0.0 if _box(one).intersects(_box(other)) else NEVER
+
+
+def _time_headway(one: Any, other: Any) -> float:
+    way = _along(one, other) + (float(other.length) - float(one.length)) / 2
+    speed = float(one.speed)
+    return min(way / speed, NEVER) if way >= 0 and speed > STANDING_MPS else NEVER
+
+
+def _deceleration_to_avoid(one: Any, other: Any) -> float:
+    way, closing = _along(one, other), float(one.speed) - float(other.speed)
+    if way <= 0 or closing <= 0:
+        return 0.0
+    gap = way - (float(one.length) + float(other.length)) / 2
+    return min(closing * closing / (2 * gap), NEVER) if gap > STANDING_MPS else NEVER
+
+
+def _box(owner: Any) -> Any:
+    return box_polygon(*_xy(owner), float(owner.heading), float(owner.width), float(owner.length))
 
 
 def _along(owner: Any, place: Any) -> float:

@@ -32,8 +32,8 @@ from scenicq.syntax.parser import parse
 from scenicq.syntax.walk import walk
 
 PAGES = Path(__file__).parent / "language"
-NOT_ERRORS_OF_PROGRAMS = {"option-invalid", "soft-requirement", "no-map"}
-"""An error of the command line, a warning of a run, and a note where there is no map."""
+NOT_ERRORS_OF_PROGRAMS = {"option-invalid", "soft-requirement", "not-recorded", "no-map"}
+"""An error of the command line, warnings of a run, and a note where there is no map."""
 
 _BLOCK = re.compile(r"^```scenic(?P<options>[^\n]*)\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL)
 _ERROR = re.compile(r"#\s*error:\s*\[([a-z-]+)\]")

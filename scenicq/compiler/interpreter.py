@@ -24,6 +24,7 @@ from scenicq.compiler.items import items_of
 from scenicq.compiler.known_properties import known_truth
 from scenicq.compiler.logic import condition
 from scenicq.compiler.monitors import MonitorCall, MonitorDefinition
+from scenicq.compiler.recorded_values import RecordStatement, record_statement
 from scenicq.compiler.requirements import RequireStatement, requirement
 from scenicq.compiler.scoping import own_names
 from scenicq.compiler.specifier_meanings import SpecifierContext, bind
@@ -84,6 +85,7 @@ class Interpreter:
         gap_s: Seconds without a label at which the course of a track is cut.
         budget: What the program may still use.
         objects: The objects made so far.
+        records: What results are to carry.
         params: Global parameters: value, place, whether a library sets it.
         excluded: Outcomes of random choices that no scene has.
         lookups: What the program asks about places of the map.
@@ -100,6 +102,7 @@ class Interpreter:
     budget: Budget = field(default_factory=Budget)
     objects: list[Instance] = field(default_factory=list[Instance])
     requirements: list[RequireStatement] = field(default_factory=list[RequireStatement])
+    records: list[RecordStatement] = field(default_factory=list[RecordStatement])
     params: dict[str, tuple[ModelValue, Span, bool]] = field(default_factory=dict[str, Any])
     excluded: Exclusions = field(default_factory=Exclusions)
     lookups: Lookups = field(default_factory=Lookups)
@@ -326,6 +329,8 @@ class Interpreter:
                 self._share(node, scope)
             case ast.Simulator():
                 self.dynamic("simulator", node.span)
+            case ast.DynamicStatement(kind="record" | "record initial" | "record final"):
+                record_statement(self, node, scope)
             case ast.DynamicStatement() | ast.DynamicDefinition() | ast.RequireMonitor() if self.timed is not None:
                 timed_statement(self, self.timed, node, scope)
             case ast.DynamicStatement() | ast.DynamicDefinition() | ast.RequireMonitor():

@@ -10,6 +10,16 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import TYPE_CHECKING
 
+from scenicq.compiler.measures import (
+    box_distance,
+    course_change,
+    deceleration_to_avoid,
+    hides,
+    jerk,
+    post_encroachment_time,
+    time_headway,
+    time_to_collision,
+)
 from scenicq.compiler.other_objects import count, nearest, others
 from scenicq.compiler.random_values import is_choice
 from scenicq.compiler.road_courses import along, beside, corridor, course
@@ -26,11 +36,19 @@ LABELS = "scenicq.labels"
 QUESTIONS: Mapping[str, Callable[..., ModelValue]] = {
     "along": along,
     "beside": beside,
+    "box_distance": box_distance,
     "corridor": corridor,
     "count": count,
     "course": course,
+    "course_change": course_change,
+    "deceleration_to_avoid": deceleration_to_avoid,
+    "hides": hides,
+    "jerk": jerk,
     "nearest": nearest,
     "others": others,
+    "post_encroachment_time": post_encroachment_time,
+    "time_headway": time_headway,
+    "time_to_collision": time_to_collision,
 }
 """What each name of the module does: a function of the interpreter, the place of the call, and what it is given."""
 

@@ -184,7 +184,7 @@ def _class(
     """The class that a function is asked about, in a condition."""
     if run.course is None:
         raise fail("unsupported-construct", f"`{name}` can be asked in conditions only", span, "not in a condition",
-                   ("ask it in `require`, `terminate when`, or a monitor",))  # fmt: skip
+                   ("ask it in `require`, `terminate when`, a monitor, or `record` it",))  # fmt: skip
     unknown = [each for each in named if each not in filters]
     if unknown:
         given = f"`{name}` takes a class{''.join(f' and `{each}=`' for each in filters)}"

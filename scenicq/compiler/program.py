@@ -21,6 +21,7 @@ from scenicq.compiler.imported_files import Loader
 from scenicq.compiler.imports import Modules
 from scenicq.compiler.interpreter import Interpreter
 from scenicq.compiler.models import default_library, is_anywhere
+from scenicq.compiler.recorded_values import recorded_values
 from scenicq.compiler.requirements import RequireStatement
 from scenicq.compiler.temporal import Behaviors, TimedStatements
 from scenicq.compiler.values import Choice, Instance, ModelValue, fail, is_node
@@ -199,6 +200,7 @@ def _scenario(
     requirements = [requirement for requirement in requirements if requirement is not None]
     requirements += _built_in(run, ego)
     ego.label = "ego"
+    records = recorded_values(run)
     names = _names(run.objects)
     on_courses = any(COURSE in instance.properties for instance in run.objects)
     objects = tuple(
@@ -219,6 +221,7 @@ def _scenario(
         ),
         tuple(run.ignored), warnings,
         dynamics=dynamics,
+        records=records,
     )  # fmt: skip
 
 
@@ -295,7 +298,7 @@ def _object(instance: Instance, name: str, *, on_courses: bool) -> ScenarioObjec
         if node is not None:
             asked = next((each for each in postorder((node,)) if has_ends(each)), None) if on_courses else None
             if asked is not None:
-                raise fail("unsupported-construct", "`along` and `beside` ask what labels show: put them in `require`",
+                raise fail("unsupported-construct", "what is asked of courses is what labels show: put it in `require`",
                            asked.span or span, "not in a property",
                            ("place the object with other words, and require this of it",))  # fmt: skip
             properties[key] = Property(node, key in instance.explicit, span)

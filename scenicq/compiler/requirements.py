@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from scenicq.compiler import expressions
 from scenicq.compiler.coerce import to_boolean
 from scenicq.compiler.courses import split
 from scenicq.compiler.environment import Environment
@@ -19,7 +20,7 @@ from scenicq.syntax import ast, phrases
 if TYPE_CHECKING:
     from scenicq.compiler.interpreter import Interpreter
 
-__all__ = ["RequireStatement", "defer", "requirement"]
+__all__ = ["RequireStatement", "defer", "defer_value", "requirement"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,6 +56,23 @@ def requirement(run: Interpreter, node: ast.Require, scope: Environment) -> Requ
 
 def defer(run: Interpreter, wanted: ast.Expression, scope: Environment, span: Span) -> Callable[[], Node]:
     """What computes a condition, once the ego is known, over the names that the program has now."""
+    evaluated = defer_value(run, wanted, scope, span, condition)
+
+    def truth() -> Node:
+        value = evaluated()
+        if isinstance(value, Delayed):
+            raise fail("wrong-type", "this needs the position of an object", wanted.span, "no object here",
+                       ("write `F at V`",))  # fmt: skip
+        return to_boolean(value, wanted.span)
+
+    return lambda: split(run, truth, wanted.span)
+
+
+def defer_value(
+    run: Interpreter, wanted: ast.Expression, scope: Environment, span: Span,
+    evaluate: Callable[[Interpreter, ast.Expression, Environment], ModelValue] = expressions.evaluate,
+) -> Callable[[], ModelValue]:  # fmt: skip
+    """What evaluates an expression, once the ego is known, over the names that the program has now."""
     names: dict[str, ModelValue] = {}
     current = scope
     while current.parent is not None:
@@ -65,23 +83,16 @@ def defer(run: Interpreter, wanted: ast.Expression, scope: Environment, span: Sp
     module = scope.module
     then = dict(module.names)
 
-    def held() -> Node:
-        return split(run, evaluated, wanted.span)
-
-    def evaluated() -> Node:
-        # names and the ego are those of the moment of the statement, also in the functions that the condition calls
+    def evaluated() -> ModelValue:
+        # names and the ego are those of the moment of the statement, also in the functions that the expression calls
         now, before = module.names, run.current_ego
         module.names, run.current_ego = now | then, ego
         try:
-            value = condition(run, wanted, frozen)
+            return evaluate(run, wanted, frozen)
         finally:
             module.names, run.current_ego = now, before
-        if isinstance(value, Delayed):
-            raise fail("wrong-type", "this needs the position of an object", wanted.span, "no object here",
-                       ("write `F at V`",))  # fmt: skip
-        return to_boolean(value, wanted.span)
 
-    return held
+    return evaluated
 
 
 def _probability(run: Interpreter, node: ast.Expression, scope: Environment) -> float:

@@ -19,22 +19,22 @@ from scenicq.forest.walk import leaves
 if TYPE_CHECKING:
     from scenicq.compiler.interpreter import Interpreter
 
-__all__ = ["along", "beside", "corridor", "course"]
+__all__ = ["along", "beside", "corridor", "course", "course_of"]
 
 
 def along(run: Interpreter, span: Span, owner: ModelValue, place: ModelValue) -> Node:
     """How far ahead of an object a place is on the object's course, in metres; behind it negative."""
-    return CourseCoordinate(_course_of(run, owner, "along", span), _known_place(place, "along", span), 0, span=span)
+    return CourseCoordinate(course_of(run, owner, "along", span), _known_place(place, "along", span), 0, span=span)
 
 
 def beside(run: Interpreter, span: Span, owner: ModelValue, place: ModelValue) -> Node:
     """How far to the left of an object's course a place is, in metres; to the right negative."""
-    return CourseCoordinate(_course_of(run, owner, "beside", span), _known_place(place, "beside", span), 1, span=span)
+    return CourseCoordinate(course_of(run, owner, "beside", span), _known_place(place, "beside", span), 1, span=span)
 
 
 def course(run: Interpreter, span: Span, owner: ModelValue) -> Node:
     """The course of an object as a region: a line, as that in the middle of a lane."""
-    return Corridor(_course_of(run, owner, "course", span), build.constant(0.0), span=span)
+    return Corridor(course_of(run, owner, "course", span), build.constant(0.0), span=span)
 
 
 def corridor(run: Interpreter, span: Span, owner: ModelValue, half_width: ModelValue) -> Node:
@@ -43,10 +43,10 @@ def corridor(run: Interpreter, span: Span, owner: ModelValue, half_width: ModelV
     if isinstance(number, bool) or not isinstance(number, int | float) or not 0 < number < 1e6:
         raise fail("wrong-value", "`corridor` needs a known number of metres, which is positive", span,
                    f"this is {number if isinstance(number, int | float) else describe(half_width)}")  # fmt: skip
-    return Corridor(_course_of(run, owner, "corridor", span), build.constant(float(number)), span=span)
+    return Corridor(course_of(run, owner, "corridor", span), build.constant(float(number)), span=span)
 
 
-def _course_of(run: Interpreter, owner: ModelValue, name: str, span: Span) -> Node:
+def course_of(run: Interpreter, owner: ModelValue, name: str, span: Span) -> Node:
     """The course of an object.
 
     Raises:

@@ -27,7 +27,7 @@ _OF_BEHAVIORS = frozenset(
      "invoke", "override", "try/interrupt", "precondition", "invariant")
 )  # fmt: skip
 _MODULAR = frozenset(("scenario", "setup", "compose", "override"))
-_SILENT = frozenset(("record", "record initial", "record final", "simulator", "initial scenario"))
+_SILENT = frozenset(("simulator", "initial scenario"))
 """What says nothing about whether a recording matches."""
 _STEP_S = 0.1
 """Seconds of a step, where the program sets no `time_step`."""

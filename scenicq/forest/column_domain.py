@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,6 +56,7 @@ from scenicq.forest.nodes import (
     Kind,
     Leaf,
     LogicOp,
+    Measure,
     Norm,
     RectangleAt,
     Rotate,
@@ -71,6 +72,7 @@ from scenicq.geometry.boxes import box_polygons
 from scenicq.geometry.containment import covers_many
 from scenicq.geometry.driven_courses import CoursePlace, measure
 from scenicq.geometry.fields import VectorField
+from scenicq.geometry.measures import MovingBoxes, time_to_collision
 from scenicq.geometry.membership import contains_many, distance_many
 from scenicq.geometry.regions import SLACK, PolygonSet, Region
 from scenicq.geometry.terms import UndecidedError
@@ -272,6 +274,11 @@ class ColumnDomain:
             return self._direction(node, args[0], args[1])
         if isinstance(node, CourseCoordinate) and isinstance(args[0].data, Coded) and isinstance(args[1].data, tuple):
             return self._course_coordinate(node, args[0].data, args)
+        if isinstance(node, Measure) and node.measure == "time_to_collision":
+            data = [arg.data for arg in args]
+            if all(isinstance(each, np.ndarray | tuple) for each in data):
+                boxes = [MovingBoxes(*cast("list[Any]", data[first : first + 5])) for first in (0, 5)]
+                return Column(time_to_collision(*boxes), common_status(args))
         if isinstance(node, Contains | Distance) and isinstance(args[1].data, tuple):
             shape, point = args[0].data, args[1].data
             if isinstance(shape, Placed):

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import operator
 from collections.abc import Callable
-from typing import cast
+from typing import Any, cast
 
 from scenicq.forest.kinds import kind_of_value
 from scenicq.forest.nodes import (
@@ -33,6 +33,7 @@ from scenicq.forest.nodes import (
     LaneCourse,
     Logic,
     LogicOp,
+    Measure,
     Node,
     Norm,
     RectangleAt,
@@ -55,6 +56,7 @@ from scenicq.geometry.boxes import box_polygon
 from scenicq.geometry.containment import covers, overlaps
 from scenicq.geometry.driven_courses import CoursePlace, lane_course
 from scenicq.geometry.fields import VectorField
+from scenicq.geometry.measures import MovingBoxes, measure_tracks, time_to_collision
 from scenicq.geometry.membership import contains, distance
 from scenicq.geometry.regions import (
     Disc,
@@ -182,6 +184,15 @@ def _course_coordinate(node: CourseCoordinate, course: CoursePlace, x: float, y:
     return low
 
 
+def _track_measure(node: Measure, courses: tuple[CoursePlace, ...]) -> float:
+    low, high = measure_tracks(node.measure, courses, node.seconds)
+    if node.end is not None:
+        return high if node.end else low
+    if low != high:
+        raise CannotEvaluate("how the track goes on")
+    return low
+
+
 def directions(field: Value, point: Value) -> tuple[float, ...] | Undefined:
     """The headings that a vector field allows at a point, at least one; `Undefined` where it has none.
 
@@ -284,6 +295,11 @@ def _compute_region(node: Node, args: tuple[Value, ...]) -> Value:
             return distance(cast(Region, region), x, y)
         case CourseCoordinate(), (CoursePlace() as course, (float() as x, float() as y)):
             return _course_coordinate(node, course, x, y)
+        case Measure(), _ if all(isinstance(each, CoursePlace) for each in given):
+            return _track_measure(node, cast("tuple[CoursePlace, ...]", given))
+        case Measure(measure="time_to_collision"), _:
+            boxes = [MovingBoxes(*cast("tuple[Any, ...]", args[first : first + 5])) for first in (0, 5)]
+            return float(time_to_collision(boxes[0], boxes[1]))
         case LaneCourse(), ((float() as x, float() as y), float() as heading):
             return lane_course(node.network, x, y, heading)
         case Corridor(), (CoursePlace() as course, float() as half_width):

@@ -1,4 +1,4 @@
-"""Conditions on numbers that are known up to two ends, as how far something is along a course (`CourseCoordinate`).
+"""Conditions on numbers that are known up to two ends: measures of courses (`CourseCoordinate`, `Measure`).
 
 A condition on such a number becomes two on its ends: one that holds only where the condition surely does, one that
 holds wherever it may. Where the form of a condition does not tell which ends these are, it is known where
@@ -21,9 +21,11 @@ from scenicq.forest.nodes import (
     Constant,
     CourseCoordinate,
     LogicOp,
+    Measure,
     Node,
 )
 from scenicq.forest.walk import children, postorder, transform
+from scenicq.geometry.measures import OF_TRACKS
 
 __all__ = ["Truths", "has_ends", "join", "opposite", "truths_by_ends"]
 
@@ -44,7 +46,9 @@ def join(op: LogicOp, *args: Truths) -> Truths:
 
 def has_ends(node: Node) -> bool:
     """Whether a node is a number that is known up to two ends."""
-    return isinstance(node, CourseCoordinate) and node.end is None
+    if isinstance(node, Measure) and node.measure not in OF_TRACKS:
+        return False
+    return isinstance(node, CourseCoordinate | Measure) and node.end is None
 
 
 def truths_by_ends(node: Node) -> Truths:
@@ -53,7 +57,8 @@ def truths_by_ends(node: Node) -> Truths:
         left, right = _ends(node.left), _ends(node.right)
         if left is not None and right is not None:
             return _compared(node, left, right)
-    numbers = [each for each in postorder((node,)) if isinstance(each, CourseCoordinate) and has_ends(each)]
+    measures = (each for each in postorder((node,)) if isinstance(each, CourseCoordinate | Measure))
+    numbers = [each for each in measures if has_ends(each)]
     lower = {id(each): replace(each, end=0) for each in numbers}
     exact = [build.compare(CompareOp.LE, replace(each, end=1), lower[id(each)], node.span) for each in numbers]
     same = transform(node, lambda each: lower.get(id(each), each))
@@ -92,7 +97,7 @@ def _ends(root: Node) -> Truths | None:
 
 def _ends_of(node: Node, below: list[Truths | None]) -> Truths | None:
     """As `_ends`, given those of what is below."""
-    if isinstance(node, CourseCoordinate):
+    if isinstance(node, CourseCoordinate | Measure) and (has_ends(node) or node.end is not None):
         return (replace(node, end=0), replace(node, end=1)) if has_ends(node) else None
     args = [each for each in below if each is not None]
     if not isinstance(node, Arithmetic) or len(args) < len(below):

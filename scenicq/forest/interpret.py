@@ -33,6 +33,7 @@ from scenicq.forest.nodes import (
     Leaf,
     Logic,
     LogicOp,
+    Measure,
     Node,
     Norm,
     Normal,
@@ -57,7 +58,9 @@ __all__ = ["AbstractDomain", "OnMap", "RegionNode", "Steps", "interpret", "steps
 
 V = TypeVar("V")
 
-OnMap: TypeAlias = Distance | DirectionAt | Contains | Intersects | Encloses | CourseCoordinate | LaneCourse
+OnMap: TypeAlias = (
+    Distance | DirectionAt | Contains | Intersects | Encloses | CourseCoordinate | Measure | LaneCourse
+)  # fmt: skip
 """What is asked of regions, vector fields and courses."""
 RegionNode: TypeAlias = (
     DiscAt | SectorAt | RectangleAt | Corridor | RegionUnion | RegionIntersection | RegionDifference
@@ -193,7 +196,10 @@ def _value(node: Node, args: list[V], domain: AbstractDomain[V]) -> V:
             return domain.select(args[0], args[1:])
         case Range() | DiscreteRange() | Normal() | TruncatedNormal() | Index() | PointIn():
             return domain.variable(node, args)
-        case Distance() | DirectionAt() | Contains() | Intersects() | Encloses() | CourseCoordinate() | LaneCourse():
+        case (
+            Distance() | DirectionAt() | Contains() | Intersects() | Encloses() | CourseCoordinate() | Measure()
+            | LaneCourse()
+        ):  # fmt: skip
             return domain.on_map(node, args)
         case (
             DiscAt() | SectorAt() | RectangleAt() | Corridor() | RegionUnion() | RegionIntersection()

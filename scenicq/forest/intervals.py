@@ -33,6 +33,7 @@ from scenicq.forest.nodes import (
     LaneCourse,
     Leaf,
     LogicOp,
+    Measure,
     PointIn,
     Range,
     RectangleAt,
@@ -44,6 +45,7 @@ from scenicq.forest.nodes import (
     Undefined,
     Value,
 )
+from scenicq.geometry.measures import NEVER
 from scenicq.geometry.membership import bounds as region_bounds
 from scenicq.geometry.regions import SLACK, Region
 
@@ -251,7 +253,9 @@ class IntervalDomain(IntervalArithmetic[E]):
         match node:
             case DirectionAt():
                 return self.within(-math.pi, math.pi)
-            case CourseCoordinate():
+            case Measure(measure="time_to_collision"):
+                return self.within(0.0, NEVER)
+            case CourseCoordinate() | Measure():
                 return self.within(-math.inf, math.inf)
             case LaneCourse():
                 return None

@@ -19,16 +19,66 @@ from typing import ClassVar, Literal, TypeAlias
 from scenicq.errors import Span
 from scenicq.geometry.driven_courses import CoursePlace
 from scenicq.geometry.fields import VectorField
+from scenicq.geometry.measures import MeasureName
 from scenicq.geometry.network import Network
 from scenicq.geometry.regions import Region
 
 __all__ = [
-    "COURSE", "ELEMENT", "GIVEN", "IDENTITY", "MIRRORED", "RANK", "TRACK", "WHO",
-    "Among", "AmongOp", "Arithmetic", "ArithmeticOp", "Bearing", "Body", "Compare", "CompareOp", "Constant", "Contains",
-    "Coordinate", "Corridor", "CourseCoordinate", "DirectionAt", "DiscAt", "DiscreteRange", "Distance", "Encloses",
-    "Feature", "Identity", "Index", "Intersects", "Kind", "LaneCourse", "Leaf", "Logic", "LogicOp", "Node", "Norm",
-    "Normal", "PointIn", "Range", "RectangleAt", "RegionDifference", "RegionIntersection", "RegionUnion", "Rotate",
-    "Scale", "SectorAt", "Select", "TruncatedNormal", "Undefined", "Value", "Vector", "VectorOf", "VectorSum",
+    "COURSE",
+    "ELEMENT",
+    "GIVEN",
+    "IDENTITY",
+    "MIRRORED",
+    "RANK",
+    "TRACK",
+    "WHO",
+    "Among",
+    "AmongOp",
+    "Arithmetic",
+    "ArithmeticOp",
+    "Bearing",
+    "Body",
+    "Compare",
+    "CompareOp",
+    "Constant",
+    "Contains",
+    "Coordinate",
+    "Corridor",
+    "CourseCoordinate",
+    "DirectionAt",
+    "DiscAt",
+    "DiscreteRange",
+    "Distance",
+    "Encloses",
+    "Feature",
+    "Identity",
+    "Index",
+    "Intersects",
+    "Kind",
+    "LaneCourse",
+    "Leaf",
+    "Logic",
+    "LogicOp",
+    "Measure",
+    "Node",
+    "Norm",
+    "Normal",
+    "PointIn",
+    "Range",
+    "RectangleAt",
+    "RegionDifference",
+    "RegionIntersection",
+    "RegionUnion",
+    "Rotate",
+    "Scale",
+    "SectorAt",
+    "Select",
+    "TruncatedNormal",
+    "Undefined",
+    "Value",
+    "Vector",
+    "VectorOf",
+    "VectorSum",
 ]  # fmt: skip
 
 Vector: TypeAlias = tuple[float, float]
@@ -301,6 +351,23 @@ class CourseCoordinate(_Scalar):
     end: int | None = None
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Measure(_Scalar):
+    """A measure of the field (`scenicq.geometry.measures`).
+
+    Attributes:
+        measure: Which.
+        args: Of tracks, the courses of the objects; else position, heading, velocity, width and length of each object.
+        seconds: Over how long, where that matters.
+        end: Of a measure of tracks as of `CourseCoordinate`.
+    """
+
+    measure: MeasureName
+    args: tuple[Node, ...]
+    seconds: float = 0.0
+    end: int | None = None
+
+
 # --- courses
 
 
@@ -532,6 +599,7 @@ class Among(_Node):
 Leaf: TypeAlias = Range | Normal | TruncatedNormal | DiscreteRange | Index | PointIn
 Node: TypeAlias = (
     Constant | Feature | Leaf | Select | Arithmetic | Coordinate | Norm | Bearing | Distance | DirectionAt |
-    CourseCoordinate | LaneCourse | VectorOf | VectorSum | Scale | Rotate | DiscAt | SectorAt | RectangleAt | Corridor |
+    CourseCoordinate | Measure | LaneCourse | VectorOf | VectorSum | Scale | Rotate | DiscAt | SectorAt |
+    RectangleAt | Corridor |
     RegionUnion | RegionIntersection | RegionDifference | Compare | Logic | Contains | Intersects | Encloses | Among
 )  # fmt: skip

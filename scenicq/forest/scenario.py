@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from typing import Literal
 
 from scenicq.errors import Diagnostic, Source, Span
-from scenicq.forest.nodes import Node
+from scenicq.forest.nodes import Kind, Node
 from scenicq.forest.temporal import Dynamics
 
-__all__ = ["BuiltIn", "Property", "Requirement", "Scenario", "ScenarioObject"]
+__all__ = ["BuiltIn", "Property", "RecordedValue", "Requirement", "Scenario", "ScenarioObject"]
 
 
 class BuiltIn(StrEnum):
@@ -79,6 +80,25 @@ class Requirement:
 
 
 @dataclass(frozen=True, slots=True)
+class RecordedValue:
+    """A value that results carry.
+
+    Attributes:
+        name: What it is called.
+        when: Of an interval, whether the value at each sample is wanted, or that at the first or the last.
+        value: Its expression.
+        kind: "scalar", "boolean", "vector", or "other" for a text.
+        span: Where the program says it.
+    """
+
+    name: str
+    when: Literal["always", "initial", "final"]
+    value: Node
+    kind: Kind
+    span: Span
+
+
+@dataclass(frozen=True, slots=True)
 class Scenario:
     """A scenario compiled against one map.
 
@@ -95,6 +115,7 @@ class Scenario:
         soft: Requirements with a probability below 1, which exclude nothing.
         ignored: Dynamic parts that were left out.
         warnings: What the author should know.
+        records: What results carry.
         dynamics: What it says about time; None for a static program, and where that is left out.
         as_written: Where expressions were rewritten to be matched, which keeps outcomes but not their probabilities:
             the scenario as the program has it, from which scenes are drawn.
@@ -112,4 +133,5 @@ class Scenario:
     ignored: tuple[Diagnostic, ...] = ()
     warnings: tuple[Diagnostic, ...] = field(default=())
     dynamics: Dynamics | None = None
+    records: tuple[RecordedValue, ...] = ()
     as_written: Scenario | None = field(default=None, repr=False)

@@ -21,6 +21,7 @@ from scenicq.forest.nodes import (
     Index,
     Leaf,
     Logic,
+    Measure,
     Node,
     Select,
     Undefined,
@@ -86,9 +87,11 @@ def _show(
             return f"(not {args[0]})" if len(args) == 1 else "(" + f" {node.op.value} ".join(args) + ")"
         case Coordinate():
             return f"{args[0]}.{'xy'[node.axis]}"
-        case CourseCoordinate():
+        case CourseCoordinate() | Measure():
+            name = node.measure if isinstance(node, Measure) else ("along", "beside")[node.axis]
+            seconds = f", {node.seconds:g}" if isinstance(node, Measure) and node.seconds else ""
             end = "" if node.end is None else (", at least", ", at most")[node.end]
-            return f"{('along', 'beside')[node.axis]}({', '.join(args)}{end})"
+            return f"{name}({', '.join(args)}{seconds}{end})"
         case Select():
             return f"{args[0]} of [{', '.join(args[1:])}]"
         case Bearing() | DirectionAt():

@@ -94,4 +94,13 @@ def rebuilt(scenario: Scenario, change: Callable[[Node], Node]) -> Scenario:
     dynamics = scenario.dynamics
     if dynamics is not None:
         dynamics = replace(dynamics, conditions=tuple(map(change, dynamics.conditions)))
-    return replace(scenario, objects=objects, requirements=requirements, soft=soft, params=params, dynamics=dynamics)
+    records = tuple(replace(each, value=change(each.value)) for each in scenario.records)
+    return replace(
+        scenario,
+        objects=objects,
+        requirements=requirements,
+        soft=soft,
+        params=params,
+        dynamics=dynamics,
+        records=records,
+    )

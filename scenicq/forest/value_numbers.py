@@ -24,6 +24,7 @@ from scenicq.forest.nodes import (
     LaneCourse,
     Logic,
     LogicOp,
+    Measure,
     Node,
     Norm,
     Scale,
@@ -95,6 +96,8 @@ class ValueNumbers:
                     own = node.axis
                 case CourseCoordinate():
                     own = node.axis, node.end
+                case Measure():
+                    own = node.measure, node.seconds, node.end
                 case LaneCourse():
                     own = id(node.network), node.gap_s
                 case _ if is_leaf(node):

@@ -19,7 +19,7 @@ from __future__ import annotations
 import heapq
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import cast
@@ -29,12 +29,14 @@ from numpy.typing import NDArray
 from shapely.geometry import LineString, MultiPolygon, Polygon
 
 from scenicq.geometry import shapes
-from scenicq.geometry.angles import direction
+from scenicq.geometry.angles import azimuth_array, direction
+from scenicq.geometry.boxes import box_polygons
 from scenicq.geometry.elements import Lane
 from scenicq.geometry.network import Network
 from scenicq.geometry.regions import PolygonSet, PolylineSet, Region
 
-__all__ = ["BEYOND_M", "GAP_S", "CourseLine", "CoursePlace", "Measures", "lane_course", "measure", "track_courses"]
+__all__ = ["BEYOND_M", "GAP_S", "CourseLine", "CoursePlace", "Measures", "TrackStretch", "lane_course", "measure",
+           "track_courses"]  # fmt: skip
 
 Numbers = NDArray[np.float64]
 
@@ -157,6 +159,36 @@ def _at(place: int, size: int, value: bool) -> NDArray[np.bool_]:
     return found
 
 
+@dataclass(frozen=True, eq=False)
+class TrackStretch:
+    """The samples of a track without gaps.
+
+    Attributes:
+        times_s: When they are, in order, shape (n,).
+        places: x, y, heading, width, length and jerk of each, nan where they are not known, shape (n, 6).
+        directions: Which way the course goes at each, without jumps of a full turn; shape (0,) of what stands still.
+    """
+
+    times_s: Numbers
+    places: Numbers
+    directions: Numbers
+
+    @property
+    def jerks(self) -> Numbers:
+        """The slope of the acceleration at each sample."""
+        return self.places[:, 5]
+
+    @cached_property
+    def is_boxed(self) -> NDArray[np.bool_]:
+        """At which samples the box is known."""
+        return cast("NDArray[np.bool_]", ~np.isnan(self.places[:, :5]).any(axis=1))
+
+    @cached_property
+    def boxes(self) -> NDArray[np.object_]:
+        """The boxes that are known."""
+        return box_polygons(*self.places[self.is_boxed, :5].T)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class CoursePlace:
     """The course of an object with where on it the object is at one time.
@@ -166,12 +198,16 @@ class CoursePlace:
         s: How far along it the object is.
         time_s: When.
         sign: -1 where the box faces against the course, as while the object reverses; else 1.
+        stretch: What was seen of the object; None where nothing but one label is known.
+        sample: Which of these samples it is.
     """
 
     line: CourseLine | None
     s: float = 0.0
     time_s: float = 0.0
     sign: float = 1.0
+    stretch: TrackStretch | None = None
+    sample: int = 0
 
     def ends(self, x: float, y: float) -> tuple[float, float, float, float]:
         """The ends between which a place is along and beside the course; the same question is answered once."""
@@ -298,7 +334,8 @@ def track_courses(network: Network, times_s: Numbers, places: Numbers, gap_s: fl
     Args:
         network: The map.
         times_s: When the samples are, in order, shape (n,).
-        places: x, y and heading of each, the heading nan where it is not known, shape (n, 3).
+        places: x, y and heading of each, the heading nan where it is not known, shape (n, 3); with what else a
+            `TrackStretch` has of them, shape (n, 6).
         gap_s: Between samples farther apart than this the course is cut.
     """
     if not len(times_s):
@@ -316,7 +353,11 @@ def _stretch(network: Network, times: Numbers, places: Numbers) -> list[CoursePl
     firsts, which = _merged(xy)
     corners = xy[firsts]
     if len(firsts) == 1:
-        return _of_one_place(network, times, places)
+        stretch = TrackStretch(times, places, np.empty(0)) if places.shape[1] > 3 else None
+        return [
+            replace(each, stretch=stretch, sample=number)
+            for number, each in enumerate(_of_one_place(network, times, places))
+        ]
     lasts = np.append(np.array(firsts[1:]) - 1, len(xy) - 1)
     steps = np.diff(corners, axis=0)
     lengths = np.hypot(*steps.T)
@@ -335,6 +376,7 @@ def _stretch(network: Network, times: Numbers, places: Numbers) -> list[CoursePl
     joints += [(other, 0 if one is None else one) for one, other in behind]
     line = CourseLine(pieces, joints)
     found: list[CoursePlace] = []
+    segments: list[int] = []
     for number, corner in enumerate(which):
         best: tuple[float, int, float] | None = None
         for segment in (corner, corner - 1):  # of equals the one that it drives on
@@ -353,7 +395,11 @@ def _stretch(network: Network, times: Numbers, places: Numbers) -> list[CoursePl
         against = float(steps[segment] @ np.array(faces)) < 0
         s = float(starts[segment] + part * lengths[segment])
         found.append(CoursePlace(line, s, float(times[number]), -1.0 if against else 1.0))
-    return found
+        segments.append(segment)
+    if places.shape[1] == 3:
+        return found
+    stretch = TrackStretch(times, places, np.unwrap(azimuth_array(*steps.T))[segments])
+    return [replace(each, stretch=stretch, sample=number) for number, each in enumerate(found)]
 
 
 def _merged(xy: Numbers) -> tuple[list[int], list[int]]:

@@ -13,6 +13,8 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import msgspec
+
 from scenicq.errors import render
 from scenicq.evaluate.comparison import MARGIN
 from scenicq.evaluate.detection import Missing
@@ -24,6 +26,7 @@ from scenicq.notebook.judgements import Judgement
 from scenicq.notebook.pictures import SCROLLS, DisplayedText, Picture, take_picture
 from scenicq.query.execution.interval_frames import verdict_at
 from scenicq.query.execution.lazy_solver import LazySolver
+from scenicq.query.execution.recorded_columns import flat_table
 from scenicq.query.execution.records import json_text, record
 from scenicq.query.execution.result_origin import name_origin
 from scenicq.query.execution.result_summary import ResultCount, ResultSummary
@@ -79,6 +82,7 @@ class FrameResult(_Origin):
         sensors: The sensor file of each channel; none of an interval.
         end_us: When the interval ends; of a frame its time.
         frames: How many frames it has; 1 of a frame.
+        recorded: What the program records, by name: a value, over an interval a mapping with the values at its samples.
     """
 
     frame: str
@@ -90,6 +94,7 @@ class FrameResult(_Origin):
     sensors: Mapping[str, str]
     end_us: int
     frames: int
+    recorded: Mapping[str, Any]
 
     @staticmethod
     def of(matches: Matches, result: Result) -> FrameResult:
@@ -103,6 +108,7 @@ class FrameResult(_Origin):
         made = FrameResult(
             result.frame, result.recording, result.timestamp_us, told.verdict, told.correspondence, told.witness,
             dict(result.sensors), *((result.timestamp_us, 1) if span is None else (span.end_us, span.count)),
+            msgspec.to_builtins(told.recorded or {}),
         )  # fmt: skip
         object.__setattr__(made, "matches", matches)
         object.__setattr__(made, "result", result)
@@ -248,13 +254,16 @@ class Matches(Sequence[FrameResult]):
     def to_arrow(self) -> pa.Table:
         """The results as an Arrow table with a field a role, as `-o FILE.parquet` has it."""
         every = self.query.options.all_matches
-        schema = result_schema(self.query.roles(), origin=self.origin, over_time=self.query.is_over_time(), every=every)
+        schema = result_schema(
+            self.query.roles(), origin=self.origin, over_time=self.query.is_over_time(), every=every,
+            recorded=self.query.recorded_columns(),
+        )  # fmt: skip
         schema = schema.with_metadata({**(schema.metadata or {}), **summary_metadata(self.summary)})
         return result_table((record(each.result, every=every) for each in self._all()), schema)
 
     def to_pandas(self) -> Any:
-        """The results as a data frame; pandas is to be installed."""
-        return self.to_arrow().to_pandas()
+        """The results as a data frame, what is recorded in columns as CSV has them; pandas is to be installed."""
+        return flat_table(self.to_arrow()).to_pandas()
 
     def shot_of(self, result: Result) -> tuple[Shot, Backdrop]:
         """What a picture of a result shows: of an interval its first frame, with whoever plays the roles there."""

@@ -172,8 +172,8 @@ def draw_card(card: Card) -> str:
     )
     picture = _inline(card) if card.pictures is None else _beside(card, card.pictures)
     facts = [
-        element("div", frame_facts(shot, sensors, card.texts), class_="frame", hidden=number > 0)
-        for number, (shot, sensors) in enumerate(zip(card.shots, card.sensors, strict=True))
+        element("div", frame_facts(shot, sensors, card.texts, each.recorded), class_="frame", hidden=number > 0)
+        for number, (shot, sensors, each) in enumerate(zip(card.shots, card.sensors, run.results, strict=True))
     ]
     body = element(
         "div",

@@ -10,6 +10,8 @@ from datetime import UTC, datetime, timedelta
 from scenicq.errors import Source
 from scenicq.geometry.angles import normalize, rotate
 from scenicq.match.verdict import Match, NoMatch, Unknown, Verdict
+from scenicq.query.execution.recorded_columns import show_cell
+from scenicq.query.execution.results import Recorded
 from scenicq.query.execution.variable_texts import variable_texts
 from scenicq.report.camera_pictures import SpaceBox, camera_image, space_box
 from scenicq.report.legend import legend
@@ -173,13 +175,26 @@ def _boxes(shot: Shot) -> Iterator[SpaceBox]:
             yield box
 
 
-def frame_facts(shot: Shot, sensors: Sequence[Sensor], texts: Mapping[str, str]) -> str:
+def _recorded(recorded: Mapping[str, Recorded]) -> str:
+    """What a match carries of what the program records; of what is null, why."""
+    rows = [
+        (element("code", escape(name)), element("span", escape(show_cell(each.values[0])), class_="where"),
+         escape(", ".join(each.lacking)))
+        for name, each in recorded.items()
+    ]  # fmt: skip
+    return table("Recorded", ("name", "value", ""), rows)
+
+
+def frame_facts(
+    shot: Shot, sensors: Sequence[Sensor], texts: Mapping[str, str], recorded: Mapping[str, Recorded] | None = None
+) -> str:  # fmt: skip
     """All that is said of a frame.
 
     Args:
         shot: The frame.
         sensors: Its sensor files.
         texts: As `variable_texts` gives them.
+        recorded: What the program records of it.
     """
     label = shot.label
     parts = [
@@ -193,6 +208,8 @@ def frame_facts(shot: Shot, sensors: Sequence[Sensor], texts: Mapping[str, str])
         _cause(shot),
         _roles(shot),
     ]
+    if recorded:
+        parts.append(_recorded(recorded))
     if isinstance(shot.verdict, Match) and shot.scenario is not None:
         parts.append(_margins(shot))
         parts.append(_witness(shot.verdict, shot.scenario.source, texts))

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import groupby
 
 from scenicq.query.execution.interval_frames import frames_of, verdict_at
-from scenicq.query.execution.results import Result
+from scenicq.query.execution.recorded_columns import show_cell
+from scenicq.query.execution.results import Recorded, RecordedCell, Result
 from scenicq.query.execution.run import Query
 from scenicq.query.explain.bands import Band, bands_of
 from scenicq.query.explain.interval_explanation import placed
@@ -27,22 +29,57 @@ def interval_runs(query: Query, results: Iterable[Result], numbers: dict[str, tu
     """
     for result in results:
         frames = tuple(
-            Result(label.frame, label.recording, label.timestamp_us, verdict_at(label, result), label.sensors)
-            for label, _ in frames_of(query.dataset, result)
-        )
+            Result(
+                label.frame, label.recording, label.timestamp_us, verdict_at(label, result), label.sensors,
+                recorded=_at_sample(result.recorded or {}, place),
+            )
+            for place, (label, _) in enumerate(frames_of(query.dataset, result))
+        )  # fmt: skip
         number, count = numbers[result.frame]
         yield FrameRun(result.recording, frames, number, count, _timeline(query, result))
 
 
+def _at_sample(recorded: Mapping[str, Recorded], place: int) -> Mapping[str, Recorded]:
+    """What is recorded at a sample, and what of the whole interval."""
+    return {
+        name: Recorded((each.values[place],), series=False) if each.series else each for name, each in recorded.items()
+    }
+
+
 def _timeline(query: Query, result: Result) -> str:
-    """The bands of an interval as a picture; nothing for a program about one instant."""
+    """The bands of an interval as a picture, and curves of what the program records."""
+    curves = [_curve(name, each.values) for name, each in (result.recorded or {}).items() if each.series]
     scenario, tracks, interval = placed(query, result)
-    if scenario.dynamics is None:
+    return _drawn(() if scenario.dynamics is None else bands_of(scenario, tracks, interval), [*filter(None, curves)])
+
+
+def _curve(name: str, values: Sequence[RecordedCell]) -> str:
+    """Numbers over the samples, with gaps where there are none; nothing of what has no numbers."""
+    numbers = [None if each is None or isinstance(each, str | tuple) else float(each) for each in values]
+    known = [each for each in numbers if each is not None]
+    if not known:
         return ""
-    return _drawn(bands_of(scenario, tracks, interval))
+    least, most = min(known), max(known)
+    height = (most - least) or 1.0
+    points = [
+        None if each is None else (n + 0.5, 9.0 - 8.0 * (each - least) / height) for n, each in enumerate(numbers)
+    ]
+    lines: list[str] = []
+    for there, group in groupby(points, key=lambda each: each is not None):
+        some = [each for each in group if each is not None]
+        if there:
+            # of one sample a short line
+            (first, y), (last, _) = some[0], some[-1]
+            some = [(first - 0.5, y), (last + 0.5, y)] if len(some) == 1 else some
+            lines.append(element("polyline", points=" ".join(f"{x:g},{y:.3g}" for x, y in some), class_="curve"))
+    told = f"{name}: {show_cell(least)} to {show_cell(most)}"
+    lines.append(element("line", class_="now", x1=0.5, x2=0.5, y1=0, y2=10))
+    strip = element("svg", element("title", escape(told)), *lines, class_="strip curves", role="img",
+                    viewBox=f"0 0 {len(values)} 10", preserveAspectRatio="none", aria_label=told)  # fmt: skip
+    return element("li", element("span", escape(told)), strip)
 
 
-def _drawn(bands: tuple[Band, ...]) -> str:
+def _drawn(bands: tuple[Band, ...], curves: Sequence[str]) -> str:
     rows: list[str] = []
     for band in bands:
         count = len(band.values)
@@ -57,6 +94,7 @@ def _drawn(bands: tuple[Band, ...]) -> str:
                         preserveAspectRatio="none", aria_label=_summary(band.values))  # fmt: skip
         told = element("b" if band.is_requirement else "span", escape(band.what))
         rows.append(element("li", told, strip))
+    rows += curves
     return element("ul", *rows, class_="timeline", aria_label="Timeline") if rows else ""
 
 

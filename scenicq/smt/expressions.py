@@ -33,6 +33,7 @@ from scenicq.forest.nodes import (
     Intersects,
     LaneCourse,
     Logic,
+    Measure,
     Node,
     Norm,
     Normal,
@@ -174,7 +175,7 @@ class Expressions:
             case Bearing():
                 x, y = cast(TermVector, args[0])
                 return apply(Operator.ATAN2, apply(Operator.NEG, x), y)
-            case CourseCoordinate() | LaneCourse() | Corridor():
+            case CourseCoordinate() | Measure() | LaneCourse() | Corridor():
                 raise UnsupportedError("a course that hangs on what no label shows")
             case Among():
                 raise UnsupportedError("a condition on other label objects that hangs on what no label shows")

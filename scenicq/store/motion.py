@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scenicq.geometry.angles import normalize_array
 from scenicq.store.columns import MemberColumns
 
-__all__ = ["FITTED_S", "FITTED_SAMPLES", "LONGEST_GAP_US", "MotionColumns", "motion_of", "track_numbers"]
+__all__ = ["FITTED_S", "FITTED_SAMPLES", "LONGEST_GAP_US", "MotionColumns", "motion_of", "slopes", "track_numbers"]
 
 LONGEST_GAP_US = 1_500_000
 """Microseconds between two samples of a track beyond which neither says anything of the other."""
@@ -60,12 +60,10 @@ def motion_of(times_us: NDArray[np.int64], members: MemberColumns, tracks: Seque
     derived = np.isnan(members.vx) & ~np.isnan(x)
     vx, vy = np.where(derived, x, members.vx), np.where(derived, y, members.vy)
     sine, cosine = np.sin(members.heading), np.cos(members.heading)
-    # speeds near the end of all numbers have no slope that is one
     with np.errstate(over="ignore", invalid="ignore"):
         backwards = vy * cosine - vx * sine < 0
         speed = np.where(np.isnan(members.heading), np.nan, np.hypot(vx, vy) * np.where(backwards, -1.0, 1.0))
-        slopes = _slopes(times_us, speed, tracks)
-    acceleration = np.where(np.isfinite(slopes), slopes, np.nan)
+    acceleration = slopes(times_us, speed, tracks)
     return MotionColumns(vx, vy, acceleration, steps.rate(members.heading, turns=True), derived)
 
 
@@ -111,10 +109,12 @@ class _Steps:
         return np.divide(change, seconds, out=np.full(len(values), np.nan), where=seconds > 0)
 
 
-def _slopes(times_us: NDArray[np.int64], values: Numbers, tracks: Sequence[str | None]) -> Numbers:
+@np.errstate(over="ignore", invalid="ignore")
+def slopes(times_us: NDArray[np.int64], values: Numbers, tracks: Sequence[str | None]) -> Numbers:
     """Least-squares slopes of values over the samples around each, a second; nan where a track has too few samples.
 
-    The samples are those of the track that have a value, equally many on both sides, as long as there are any.
+    The samples are those of the track that have a value, equally many on both sides, as long as there are any. Values
+    near the end of all numbers have no slope that is one.
     """
     known = np.flatnonzero(~np.isnan(values))
     track = track_numbers(tracks)[known]
@@ -140,7 +140,7 @@ def _slopes(times_us: NDArray[np.int64], values: Numbers, tracks: Sequence[str |
         count, t, square, v, product = sums
         enough = (count >= FITTED_SAMPLES) & (times[high] - times[low] >= FITTED_S - 1e-6)
         slope = (count * product - t * v)[enough] / (count * square - t * t)[enough]
-        found[order[place[enough]]] = slope
+        found[order[place[enough]]] = np.where(np.isfinite(slope), slope, np.nan)
         going_on = ~enough & ((low > first[place]) | (high < last[place]))
         place, low, high, sums = place[going_on], low[going_on], high[going_on], sums[:, going_on]
     return found

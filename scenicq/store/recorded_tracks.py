@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from scenicq.geometry.driven_courses import CoursePlace, lane_course, track_courses
 from scenicq.geometry.network import Network
+from scenicq.store.motion import slopes
 from scenicq.store.place import StoreFile
 from scenicq.store.reader import RowFile
 
@@ -22,7 +23,8 @@ __all__ = ["EGO", "RecordedTracks", "RecordingCourses"]
 
 _KEPT = 4
 """Recordings that are kept."""
-_PLACE = ("x", "y", "heading")
+_PLACE = ("x", "y", "heading", "width", "length", "acceleration")
+"""What is read of each sample of a track; the acceleration for its slope."""
 EGO = ("ego", "")
 """The track of the ego."""
 
@@ -34,7 +36,8 @@ class RecordingCourses:
     Attributes:
         frames: The number of the sample of each frame.
         times_s: Seconds since the first sample, shape (n,).
-        tracks: By track (of the ego `EGO`) the samples in which it is seen, in order, and x, y and heading there.
+        tracks: By track (of the ego `EGO`) the samples in which it is seen, in order, and what is known of it there, as
+            `scenicq.geometry.driven_courses.TrackStretch` has it.
     """
 
     frames: dict[str, int]
@@ -55,7 +58,7 @@ class RecordingCourses:
         """
         key = track, id(network), gap_s
         if key not in self._known:
-            samples, places = self.tracks.get(track, (np.empty(0, np.int64), np.empty((0, 3))))
+            samples, places = self.tracks.get(track, (np.empty(0, np.int64), np.empty((0, len(_PLACE)))))
             made = track_courses(network, self.times_s[samples], places, gap_s)
             self._known[key] = dict(zip(samples.tolist(), made, strict=True))
         return self._known[key].get(sample)
@@ -81,6 +84,12 @@ class RecordedTracks:
             self._kept[recording] = self._read(recording)
         return self._kept[recording]
 
+    def rows(self, recording: str) -> tuple[int, int, int]:
+        """The part that has a recording, and the rows of its labels there, the last left out."""
+        if self._runs is None:
+            self._runs = self._find_runs()
+        return self._runs[recording]
+
     def course(
         self, network: Network, gap_s: float, recording: str, frame: str, track: tuple[str, str] | None,
         place: tuple[float, float, float | None],
@@ -103,9 +112,7 @@ class RecordedTracks:
         return lane_course(network, *place)
 
     def _read(self, recording: str) -> RecordingCourses:
-        if self._runs is None:
-            self._runs = self._find_runs()
-        part, first, end = self._runs[recording]
+        part, first, end = self.rows(recording)
         labels, objects = self._opened(part)
         rows = labels.take(np.arange(first, end))
         start = int(rows["first_object"][0].as_py())
@@ -113,6 +120,7 @@ class RecordedTracks:
         others = objects.take(np.arange(start, start + int(counts.sum())))
         times = rows["timestamp_us"].to_numpy().astype(np.int64)
         egos = np.column_stack([rows[f"ego_{name}"].to_numpy().astype(np.float64) for name in _PLACE])
+        egos[:, -1] = slopes(times, egos[:, -1], ["ego"] * len(egos))
         # in place of an ego that is absent stands a mere point to look from, of no class
         there = np.flatnonzero([bool(each) for each in rows["ego_class"].to_pylist()])
         tracks: dict[tuple[str, str], tuple[NDArray[np.int64], NDArray[np.float64]]] = {EGO: (there, egos[there])}
@@ -120,6 +128,7 @@ class RecordedTracks:
         names = np.array(others["track"].to_pylist(), dtype=object)
         named = np.flatnonzero(names != None)  # noqa: E711 - element by element
         places = np.column_stack([others[name].to_numpy().astype(np.float64) for name in _PLACE])
+        places[:, -1] = slopes(times[sample], places[:, -1], names.tolist())
         if len(named):
             distinct, which = np.unique(names[named].astype(str), return_inverse=True)
             order = named[np.argsort(which, kind="stable")]

@@ -370,6 +370,16 @@ class TrackBlock:
         """The id of a label object."""
         return self._objects.texts("id", self._rows[member : member + 1])[0]
 
+    def ids(self) -> list[str]:
+        """The id of each label object."""
+        return self._objects.texts("id", self._rows)
+
+    def track_names(self) -> list[str | None]:
+        """The name of the track of each label object; None where it has none."""
+        codes, names = self._names()
+        named = [*names, None]
+        return [named[min(code, len(names))] for code in codes.tolist()]
+
     def frame(self, label: int) -> str:
         """The name of a label's frame."""
         return self.frames(np.array([label]))[0]

@@ -121,7 +121,9 @@ def decoded_bytes(array: Any, record: int = 0) -> int:
             total += record * len(each)
             stack += each.flatten()
         elif kinds.is_map(kind):
-            first, *_, end = each.offsets.to_pylist()
+            # of an empty map within another there is one
+            offsets = each.offsets.to_pylist()
+            first, end = offsets[0], offsets[-1]
             stack += [each.keys.slice(first, end - first), each.items.slice(first, end - first)]
         elif kinds.is_list(kind) or kinds.is_large_list(kind) or kinds.is_fixed_size_list(kind):
             stack.append(each.flatten())

@@ -601,13 +601,18 @@ class DynamicStatement(SyntaxNode):
 
     Attributes:
         kind: Which.
-        operand: The condition of `terminate when` and `terminate simulation when`, the number of `terminate after`.
+        operand: The condition of `terminate when` and `terminate simulation when`, the number of `terminate after`, the
+            value of `record`.
         unit: "seconds" or "steps" for `terminate after`.
+        name: What `record` calls its value; "" where it does not say.
+        manners: `every`, `after`, `to`: what `record` says of how it is recorded.
     """
 
     kind: str
     operand: Expression | None = None
     unit: str = ""
+    name: str = ""
+    manners: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -608,6 +608,24 @@ class ProgramParser(ExpressionParser):
         unit = self.unit() if kind == "wait for" else ""
         return ast.DynamicStatement(self.span(start), kind, operand, unit)
 
+    def record(self, kind: str) -> ast.Statement:
+        """Read `record`, `record initial` or `record final`."""
+        start = self.advance().start
+        if kind != "record":
+            self.advance()
+        operand = self.expression()
+        manners: list[str] = []
+        for word in ("every", "after") if kind == "record" else ():
+            if self.accept(word):
+                manners.append(word)
+                self.expression()
+                self.unit()
+        name = self.name_after("value") or ""
+        if kind == "record" and self.accept("to"):
+            manners.append("to")
+            self.expression()
+        return ast.DynamicStatement(self.span(start), kind, operand, name=name, manners=tuple(manners))
+
     def unit(self) -> str:
         """Read the unit of a time."""
         if self.text not in ("seconds", "steps"):
@@ -623,6 +641,8 @@ class ProgramParser(ExpressionParser):
             return self.terminate(kind)
         if kind in ("wait for", "wait until"):
             return self.wait(kind)
+        if kind.startswith("record"):
+            return self.record(kind)
         start = self.token.start
         while not self.at_line_end():
             self.advance()

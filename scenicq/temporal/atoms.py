@@ -214,6 +214,18 @@ class AtomColumns:
         found = self._evaluate(node, {}, counts)
         return None if any((each > 1).any() for each in counts.values()) else found
 
+    def with_first_directions(self, node: Node) -> tuple[Column, NDArray[np.bool_]]:
+        """As `column`, with the first of several directions, and where a field allows several; shape (n,).
+
+        Raises:
+            UnclearVariable: It hangs on a random variable without a value.
+        """
+        counts: dict[int, NDArray[np.intp]] = {}
+        found, several = self._evaluate(node, {}, counts), np.zeros(len(self.samples), np.bool_)
+        for each in counts.values():
+            several |= np.greater(each, 1)
+        return found, several
+
     def observed(self, feature: Feature, sample: int) -> Value:
         """What is observed of a feature at a sample; None if nothing is."""
         column = self._feature(feature)

@@ -23,6 +23,7 @@ from scenicq.forest.nodes import (
     Index,
     LaneCourse,
     Logic,
+    Measure,
     Node,
 )
 from scenicq.forest.scenario import Scenario
@@ -74,6 +75,8 @@ def shape_of(group: Group, ego: int, tolerance: Tolerance) -> GroupShape:
                 own = (id(node.body), node.op, node.category, node.number, node.excluded)
             case CourseCoordinate():
                 own = node.axis, node.end
+            case Measure():
+                own = node.measure, node.seconds, node.end
             case LaneCourse():
                 own = id(node.network), node.gap_s
             case _ if is_leaf(node):

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenicq.budget import deadline
+from scenicq.budget import DeadlineError, deadline
 from scenicq.forest.among import properties_of_others
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.unobserved import MOTION
@@ -34,6 +34,7 @@ if TYPE_CHECKING:  # they take long to load, and not every query needs the last 
 
     from scenicq.match.matcher import Matcher
     from scenicq.match.problem.candidates import Candidates
+    from scenicq.query.execution.recorder import Recorder
     from scenicq.query.execution.recording_matcher import DecidedRecordings, RecordingMatcher
 
 _FIRST_BATCH, _BATCH = 16, 2048
@@ -124,6 +125,7 @@ class Decider:
     reasons: bool = True
     time: IntervalOptions = field(default_factory=IntervalOptions)
     until: float | None = None
+    _recorders: dict[str, Recorder] = field(default_factory=dict["str", "Recorder"])
     _compiled: dict[str, CompiledMap] = field(default_factory=dict["str", CompiledMap])
     _matchers: dict[str, Matcher] = field(default_factory=dict["str", "Matcher"])
     _over_time: dict[str, RecordingMatcher] = field(default_factory=dict["str", "RecordingMatcher"])
@@ -157,7 +159,16 @@ class Decider:
         """
         with deadline(self.until):
             decided = self._decide(block)
-        return decided if self.until is None else replace(decided, found=self._in_time(iter(decided.found)))
+        if self.until is not None:
+            decided = replace(decided, found=self._in_time(iter(decided.found)))
+        recorder = self._recorder(self._compiled[block.map])
+        if recorder is None:
+            return decided
+        # what was found in time is recorded, however late it is then
+        if decided.recordings is not None:
+            decided.recordings.results = recorder.fill(decided.recordings.results)
+            return decided
+        return replace(decided, found=_with_records(recorder, iter(decided.found)))
 
     def _in_time(self, found: Iterator[list[Result]]) -> Iterator[list[Result]]:
         """What is found before the time is over, which is looked at while each is looked for."""
@@ -249,6 +260,18 @@ class Decider:
         left = Survivors(every[missed < 0], rows, plan.roles or (), read)
         return Decided(missed, [], [], recordings.decide(block, left))
 
+    def _recorder(self, compiled: CompiledMap) -> Recorder | None:
+        """What works out what the program records; None where nobody reads that."""
+        if not (self.proofs and compiled.scenario.records):
+            return None
+        name = compiled.network.name
+        if name not in self._recorders:
+            # takes long to load
+            from scenicq.query.execution.recorder import Recorder  # noqa: PLC0415
+
+            self._recorders[name] = Recorder(self.dataset, compiled.scenario, self.options)
+        return self._recorders[name]
+
     def _players(
         self, plan: Plan, block: Block, frames: NDArray[np.int64]
     ) -> tuple[NDArray[np.int16], Mapping[str, NDArray[Any]]]:
@@ -300,6 +323,24 @@ class Decider:
                 for (label, _), verdict in zip(batch, matcher.match_all(batch, details=self.every), strict=True):
                     yield [_result(label, verdict)]
             size = _BATCH
+
+
+def _with_records(recorder: Recorder, found: Iterator[list[Result]]) -> Iterator[list[Result]]:
+    """Results with what the program records, which is worked out of many together."""
+    size, late = _FIRST_BATCH, False
+    while not late:
+        taken: list[list[Result]] = []
+        try:
+            taken.extend(islice(found, size))
+        except DeadlineError:
+            late = True
+        told = iter(recorder.fill([each for several in taken for each in several]))
+        for several in taken:
+            yield list(islice(told, len(several)))
+        if len(taken) < size and not late:
+            return
+        size = _BATCH
+    raise DeadlineError
 
 
 def _result(label: Label, verdict: Verdict) -> Result:

@@ -88,6 +88,9 @@ def fingerprint(dataset: Dataset, program: str, options: QueryOptions) -> str:
     asked["match"]["ignore_params"] = sorted(asked["match"]["ignore_params"])
     for name in ("jobs", "prefilter", "strict", "until"):
         asked.pop(name)
+    if "record" in program:
+        # versions before have left out what is recorded
+        asked["recorded"] = True
     text = json.dumps([tables, program, asked], sort_keys=True, default=str)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
@@ -120,7 +123,7 @@ def write_partition(folder: Path, question: str, piece: Partition, records: Iter
             counted = ResultCount()
             for each in counted.counted(records):
                 file.write((json_text(each) + "\n").encode())
-            counts = {name: getattr(query.funnel, name) for name in _COUNTS}
+            counts = {name: getattr(query.funnel, name) for name in (*_COUNTS, *_LATER)}
             summary = msgspec.to_builtins(summarize(query, counted))
             file.write((json.dumps({"funnel": counts, "summary": summary}) + "\n").encode())
     except OSError as error:
@@ -129,6 +132,8 @@ def write_partition(folder: Path, question: str, piece: Partition, records: Iter
 
 
 _COUNTS = ("frames", "candidates", "with_roles", "matches", "unknowns", "excluded", "reasons", "over_time", "broken")
+_LATER = ("unrecorded",)
+"""Counts that older versions have not written."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,7 +177,8 @@ def _piece(path: Path) -> _Piece:
     try:
         *lines, last = path.read_bytes().splitlines() or [b""]
         counts = msgspec.json.decode(last, type=_Counts)
-        funnel = Funnel(**{name: _counted(counts.funnel[name]) for name in _COUNTS})
+        there = (*_COUNTS, *(name for name in _LATER if name in counts.funnel))
+        funnel = Funnel(**{name: _counted(counts.funnel[name]) for name in there})
         records = [each for line in lines if not isinstance(each := decode_record(line), SummaryRecord)]
         return _Piece(records, funnel, counts.summary)
     except (OSError, KeyError, RecursionError, msgspec.DecodeError):

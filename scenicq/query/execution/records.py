@@ -5,7 +5,8 @@ What does not fit the declaration is refused with its place, as ``Expected `str`
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 import msgspec
@@ -14,24 +15,30 @@ from msgspec import UNSET, Struct, UnsetType
 from scenicq.errors import Source, Span
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown, Verdict, WitnessValue
 from scenicq.query.execution.result_summary import ResultSummary
-from scenicq.query.execution.results import IntervalSpan, LogDensity, Result
+from scenicq.query.execution.results import IntervalSpan, LogDensity, Recorded, RecordedCell, Result
 
 __all__ = [
     "DENSITY",
+    "RECORDED",
     "CauseRecord",
+    "CellRecord",
     "FrameRecord",
     "FramesRecord",
     "IntervalRecord",
     "Record",
+    "SeriesRecord",
     "SummaryRecord",
     "decode_record",
     "json_text",
     "read_record",
     "record",
     "record_of",
+    "recorded_fields",
 ]
 
 Number = int | float
+CellRecord = Number | bool | str | tuple[Number, Number] | None
+"""A recorded value: a number, a truth value, a text, a vector; null where there is none."""
 VerdictName = Literal["match", "unknown", "no_match"]
 _NAMES: dict[type[Verdict], VerdictName] = {Match: "match", NoMatch: "no_match", Unknown: "unknown"}
 
@@ -60,6 +67,23 @@ class FramesRecord(Struct, frozen=True):
     count: int
 
 
+class SeriesRecord(Struct, frozen=True):
+    """A recorded value over an interval.
+
+    Attributes:
+        first, last: At the first and the last sample.
+        minimum, maximum, mean: Of the samples at which it is a known number; null where there are none.
+        values: At each sample.
+    """
+
+    first: CellRecord
+    last: CellRecord
+    minimum: Number | None
+    maximum: Number | None
+    mean: Number | None
+    values: list[CellRecord]
+
+
 class FrameRecord(Struct, frozen=True, kw_only=True):
     """The verdict on one frame.
 
@@ -70,6 +94,8 @@ class FrameRecord(Struct, frozen=True, kw_only=True):
         witness: A value of each random variable that proves a match, a number or a point, by its place in the program.
         cause: What excludes a match, or leaves it open; absent in a match.
         sensors: The sensor file of each channel.
+        recorded: Of a match what the program records, by name; absent where it records nothing.
+        unrecorded: Why a recorded value is null, as a count by the reason, by name; absent where none is.
         log_density, log_density_error, log_weight, no_density: How typical the label is, as
             `scenicq.query.execution.results.LogDensity` has it; absent where that was not asked for.
         all_matches: Whether the file has every correspondence by which the frame matches; absent where it has one.
@@ -85,6 +111,8 @@ class FrameRecord(Struct, frozen=True, kw_only=True):
     witness: dict[str, Number | tuple[Number, Number]] = {}
     cause: CauseRecord | UnsetType = UNSET
     sensors: dict[str, str] = {}
+    recorded: dict[str, CellRecord] | UnsetType = UNSET
+    unrecorded: dict[str, dict[str, int]] | UnsetType = UNSET
     log_density: float | UnsetType | None = UNSET
     log_density_error: float | UnsetType | None = UNSET
     log_weight: float | UnsetType | None = UNSET
@@ -110,6 +138,8 @@ class IntervalRecord(Struct, frozen=True, kw_only=True):
         correspondence: The track of each role.
         witness, cause: As of a frame.
         open_ended: Whether the program does not say when the interval ends.
+        recorded: As of a frame; over all samples of the interval, unless `initial` or `final` is recorded.
+        unrecorded: As of a frame, samples counted.
         log_density, log_density_error, log_weight, no_density, dataset, summary: As of a frame.
     """
 
@@ -122,6 +152,8 @@ class IntervalRecord(Struct, frozen=True, kw_only=True):
     witness: dict[str, Number | tuple[Number, Number]] = {}
     cause: CauseRecord | UnsetType = UNSET
     open_ended: bool = False
+    recorded: dict[str, CellRecord | SeriesRecord] | UnsetType = UNSET
+    unrecorded: dict[str, dict[str, int]] | UnsetType = UNSET
     log_density: float | UnsetType | None = UNSET
     log_density_error: float | UnsetType | None = UNSET
     log_weight: float | UnsetType | None = UNSET
@@ -142,6 +174,8 @@ class SummaryRecord(Struct, frozen=True):
 
 
 Record = FrameRecord | IntervalRecord
+RECORDED = ("recorded", "unrecorded")
+"""The fields of results of a program that records something."""
 DENSITY = ("log_density", "log_density_error", "log_weight", "no_density")
 """The fields of results that are ranked."""
 
@@ -199,6 +233,8 @@ def record(result: Result, dataset: str = "", *, every: bool = False) -> Record:
         roles, cause = verdict.partial, _cause(verdict.cause, "")
     name, origin = _NAMES[type(verdict)], dataset or UNSET
     more = {} if result.density is None else _density(result.density)
+    if result.recorded is not None:
+        more |= _recorded(result.recorded, series=span is not None)
     if span is None:
         return FrameRecord(frame=result.frame, recording=result.recording, timestamp_us=result.timestamp_us,
                            verdict=name, correspondence=_dict(roles), witness=witness, cause=cause,
@@ -208,6 +244,27 @@ def record(result: Result, dataset: str = "", *, every: bool = False) -> Record:
     return IntervalRecord(recording=result.recording, start_us=result.timestamp_us, end_us=span.end_us, frames=frames,
                           verdict=name, correspondence=_dict(roles), witness=witness, cause=cause,
                           open_ended=span.open_ended, dataset=origin, **more)  # fmt: skip
+
+
+def recorded_fields(recorded: Mapping[str, Recorded], *, series: bool) -> dict[str, CellRecord | SeriesRecord]:
+    """What a result carries as it is written.
+
+    Args:
+        recorded: What it carries, by name.
+        series: Whether the result is of an interval; of a frame the values at each sample are one.
+    """
+    return {name: _series(each.values) if each.series and series else each.values[0] for name, each in recorded.items()}
+
+
+def _recorded(recorded: Mapping[str, Recorded], *, series: bool) -> dict[str, Any]:
+    lacking = {name: dict(each.lacking) for name, each in recorded.items() if each.lacking}
+    return {"recorded": recorded_fields(recorded, series=series), "unrecorded": lacking or UNSET}
+
+
+def _series(values: Sequence[RecordedCell]) -> SeriesRecord:
+    numbers = [each for each in values if isinstance(each, float | int) and not isinstance(each, bool)]
+    least, most, mean = (min(numbers), max(numbers), math.fsum(numbers) / len(numbers)) if numbers else (None,) * 3
+    return SeriesRecord(values[0], values[-1], least, most, mean, list(values))
 
 
 def _dict(texts: Mapping[str, str]) -> dict[str, str]:
@@ -239,11 +296,20 @@ def read_record(record: Record, source: Source) -> Result:
         source: The program, in which causes have their place.
     """
     verdict = _verdict(record, source)
+    lacking, told = record.unrecorded or {}, record.recorded
+    recorded = None if told is UNSET else {
+        name: Recorded(tuple(each.values), series=True, lacking=lacking.get(name, {}))
+        if isinstance(each, SeriesRecord)
+        else Recorded((each,), series=False, lacking=lacking.get(name, {}))
+        for name, each in told.items()
+    }  # fmt: skip
     if isinstance(record, FrameRecord):
-        return Result(record.frame, record.recording, record.timestamp_us, verdict, record.sensors)
+        return Result(
+            record.frame, record.recording, record.timestamp_us, verdict, record.sensors, recorded=recorded
+        )  # fmt: skip
     frames = record.frames
     span = IntervalSpan(frames.last, record.end_us, frames.count, record.open_ended)
-    return Result(frames.first, record.recording, record.start_us, verdict, interval=span)
+    return Result(frames.first, record.recording, record.start_us, verdict, interval=span, recorded=recorded)
 
 
 def _verdict(record: Record, source: Source) -> Verdict:

@@ -20,6 +20,7 @@ from msgspec import UNSET, structs
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.query.execution.csv_cells import unquote_cell
+from scenicq.query.execution.recorded_columns import is_cell, read_cells
 from scenicq.query.execution.records import DENSITY, Record, SummaryRecord, decode_record, record_of
 from scenicq.query.execution.result_summary import Completeness, ResultSummary, join_summaries
 from scenicq.query.execution.result_tables import METADATA, read_row, read_summary
@@ -32,7 +33,7 @@ _T = TypeVar("_T")
 _NEEDED = ("frame", "recording", "verdict", "timestamp_us", "correspondence", "cause",
            "start_us", "end_us", "frames")  # fmt: skip
 """What tells what became of a result."""
-_NESTED = ("correspondence", "cause", "sensors", "witness", "frames", "summary")
+_NESTED = ("correspondence", "cause", "sensors", "witness", "frames", "unrecorded", "summary")
 _LONGEST = 10_000_000
 """Characters of a cell of CSV."""
 
@@ -160,10 +161,12 @@ def _of_csv(path: Path, text: str) -> Iterator[Record | SummaryRecord]:
 
 def _values(row: Mapping[str, Any]) -> dict[str, Any]:
     """The values of cells, of which some hold JSON; an empty one says nothing."""
-    found: dict[str, Any] = {}
+    found: dict[str, Any] = read_cells({name: cell for name, cell in row.items() if isinstance(cell, str)})
     for name, cell in row.items():
         # a row that is too long or too short has cells that are no texts
         text = unquote_cell(cell) if isinstance(cell, str) else cell
+        if is_cell(name):
+            continue
         if text == "":
             found |= {name: None} if name in DENSITY else {}
         else:

@@ -62,6 +62,10 @@ class ResultSummary(Struct, frozen=True, omit_defaults=True, kw_only=True):
         limit: Matches after which the query was to stop.
         sample: How many matches were drawn, where not all were wanted.
         sampled_from: The number that they were sampled from.
+        where: The condition on recorded values that matches meet.
+        sort: The recorded value that they are ordered by.
+        left_out: How many matches are left out: they do not meet the condition, that is not known, or they come behind
+            the limit of an order.
         skipped: Frames that nobody has looked at.
         variables: What the program says at the place of each random variable of its author's, for readers of witnesses.
     """
@@ -74,6 +78,9 @@ class ResultSummary(Struct, frozen=True, omit_defaults=True, kw_only=True):
     limit: int | UnsetType = UNSET
     sample: int | UnsetType = UNSET
     sampled_from: int | UnsetType = UNSET
+    where: str | UnsetType = UNSET
+    sort: str | UnsetType = UNSET
+    left_out: int = 0
     skipped: tuple[Stretch, ...] = ()
     variables: dict[str, str] = {}
 
@@ -89,7 +96,16 @@ class ResultSummary(Struct, frozen=True, omit_defaults=True, kw_only=True):
             told.append(f"--{why}{limit} ended the query before {frames:,} of {self.frames:,} frames were looked at")
         if self.sample is not UNSET and not self.complete:
             told.append(f"--sample shows {self.sample:,} of {self.sampled_from or 0:,} matches")
+        if self.left_out:
+            told.append(f"{self.chosen_by} leaves out {self.left_out:,} matches")
         return ", and ".join(told) or ("" if self.complete else "something was left out")
+
+    @property
+    def chosen_by(self) -> str:
+        """The options that have left matches out by what these carry; "" where none has."""
+        where = f"--where '{self.where}'" if self.where else ""
+        limit = f"--sort {self.sort} --limit {self.limit}" if self.sort and self.limit else ""
+        return " with ".join(each for each in (where, limit) if each) if self.left_out else ""
 
 
 def join_summaries(parts: Sequence[ResultSummary]) -> ResultSummary | None:
@@ -109,6 +125,9 @@ def join_summaries(parts: Sequence[ResultSummary]) -> ResultSummary | None:
         limit=next((each.limit for each in parts if each.limit is not UNSET), UNSET),
         sample=sum(each.sample or 0 for each in sampled) if sampled else UNSET,
         sampled_from=sum(each.sampled_from or 0 for each in sampled) if sampled else UNSET,
+        where=next((each.where for each in parts if each.where is not UNSET), UNSET),
+        sort=next((each.sort for each in parts if each.sort is not UNSET), UNSET),
+        left_out=sum(each.left_out for each in parts),
         skipped=tuple(stretch for each in parts for stretch in each.skipped),
         variables={place: text for each in parts for place, text in each.variables.items()},
     )
@@ -169,6 +188,8 @@ class Completeness:
         for each in summary.skipped:
             if each.has(recording, timestamp_us, frame):
                 return f"not looked at: --{each.why} ended the query"
+        if summary.left_out:
+            return f"may be left out by {summary.chosen_by}"
         return "not in the sample" if summary.sample is not UNSET and not summary.complete else ""
 
     def doubt(self, name: str, consequence: str) -> Diagnostic | None:

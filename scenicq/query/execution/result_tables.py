@@ -4,6 +4,8 @@ correspondence   struct   one text a role, null where nobody plays it
 witness          map      place of a random variable -> its numbers: one, or the two of a point
 cause            struct   what, detail, place, reason; null in a match
 sensors          map      channel -> path
+recorded         struct   what the program records, one field a value; see `recorded_columns`
+unrecorded       map      name of a recorded value -> why it is null -> how often
 frames           struct   of an interval: first, last, count
 
 The dataset and the summary stand in the metadata.
@@ -22,7 +24,16 @@ import msgspec
 import pyarrow as pa
 from msgspec import inspect
 
-from scenicq.query.execution.records import DENSITY, FrameRecord, IntervalRecord, Record, json_text, record_of
+from scenicq.query.execution.recorded_columns import RecordedColumn, recorded_struct, struct_of_row
+from scenicq.query.execution.records import (
+    DENSITY,
+    RECORDED,
+    FrameRecord,
+    IntervalRecord,
+    Record,
+    json_text,
+    record_of,
+)
 from scenicq.query.execution.result_summary import ResultSummary
 
 __all__ = ["METADATA", "read_row", "read_summary", "result_schema", "result_table", "roles_of", "summary_metadata"]
@@ -46,8 +57,9 @@ def roles_of(records: Iterable[Record]) -> tuple[str, ...]:
 
 
 def result_schema(
-    roles: Sequence[str], *, origin: str = "", ranked: bool = False, over_time: bool = False, every: bool = False
-) -> pa.Schema:
+    roles: Sequence[str], *, origin: str = "", ranked: bool = False, over_time: bool = False, every: bool = False,
+    recorded: Sequence[RecordedColumn] = (),
+) -> pa.Schema:  # fmt: skip
     """The columns of results.
 
     Args:
@@ -56,12 +68,13 @@ def result_schema(
         ranked: Whether results have a density.
         over_time: Whether the results are intervals.
         every: Whether each correspondence by which a frame matches is a result.
+        recorded: What the program records.
     """
     left_out = {"dataset", "summary", *(() if ranked else DENSITY), *(() if every else ("all_matches",))}
+    left_out |= set(() if recorded else RECORDED)
+    own = {"correspondence": pa.struct([(role, pa.string()) for role in roles]), "recorded": recorded_struct(recorded)}
     columns = [
-        (each.name, pa.struct([(role, pa.string()) for role in roles]))
-        if each.name == "correspondence"
-        else (each.name, _column(each.type))
+        (each.name, own[each.name] if each.name in own else _column(each.type))
         for each in _struct(IntervalRecord if over_time else FrameRecord).fields
         if each.name not in left_out
     ]
@@ -95,7 +108,8 @@ def result_table(records: Iterable[Record], schema: pa.Schema) -> pa.Table:
         records: The records.
         schema: Of `result_schema`, with every role that the records name.
     """
-    return pa.Table.from_pylist([_row(each) for each in records], schema=schema)
+    kind = schema.field("recorded").type if "recorded" in schema.names else None
+    return pa.Table.from_pylist([_row(each, kind) for each in records], schema=schema)
 
 
 def summary_metadata(summary: ResultSummary) -> dict[bytes, bytes]:
@@ -113,8 +127,12 @@ def read_summary(metadata: Mapping[bytes, bytes] | None) -> ResultSummary | None
     return None if text is None else msgspec.json.decode(text, type=ResultSummary)
 
 
-def _row(record: Record) -> dict[str, Any]:
+def _row(record: Record, recorded: pa.DataType | None) -> dict[str, Any]:
     cells: dict[str, Any] = msgspec.to_builtins(record)
+    if recorded is not None and "recorded" in cells:
+        cells["recorded"] = struct_of_row(cells["recorded"], recorded)
+    if "unrecorded" in cells:
+        cells["unrecorded"] = [(name, [*reasons.items()]) for name, reasons in cells["unrecorded"].items()]
     listed = ((place, [value] if isinstance(value, int | float) else value) for place, value in record.witness.items())
     return cells | {"witness": [*listed], "sensors": [*cells.get("sensors", {}).items()]}
 
@@ -133,9 +151,11 @@ def read_row(row: Mapping[str, Any], origin: str = "") -> Record:
     for name in ("correspondence", "cause"):
         if isinstance(cells := found.get(name), dict):
             found[name] = {key: value for key, value in cast("dict[str, Any]", cells).items() if value is not None}
-    for name in ("witness", "sensors"):
+    for name in ("witness", "sensors", "unrecorded"):
         if isinstance(pairs := found.get(name), list):
             found[name] = dict(cast("list[tuple[str, Any]]", pairs))
+    if isinstance(reasons := found.get("unrecorded"), dict):
+        found["unrecorded"] = {name: dict(told) for name, told in cast("dict[str, Any]", reasons).items()}
     if isinstance(witness := found.get("witness"), dict):
         numbers = cast("dict[str, list[float]]", witness)
         found["witness"] = {place: value[0] if len(value) == 1 else value for place, value in numbers.items()}

@@ -10,7 +10,10 @@ from typing import Any
 from scenicq.errors import Diagnostic
 from scenicq.match.verdict import Match, NoMatch, Unknown, Verdict
 
-__all__ = ["Funnel", "IntervalSpan", "LogDensity", "Result", "Sample"]
+__all__ = ["Chosen", "Funnel", "IntervalSpan", "LogDensity", "Recorded", "RecordedCell", "Result", "Sample"]
+
+RecordedCell = float | bool | str | tuple[float, float] | None
+"""A recorded value: a number, a truth value, a text, a vector; None where there is none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +55,21 @@ class LogDensity:
 
 
 @dataclass(frozen=True, slots=True)
+class Recorded:
+    """What a result carries of a value that the program records.
+
+    Attributes:
+        values: One, or of an interval one for each of its samples.
+        series: Whether the program asks for it at each sample.
+        lacking: At how many of these samples there is none, by the reason.
+    """
+
+    values: tuple[RecordedCell, ...]
+    series: bool
+    lacking: Mapping[str, int] = field(default_factory=dict[str, int])
+
+
+@dataclass(frozen=True, slots=True)
 class Result:
     """The verdict on one frame, or on an interval of a recording.
 
@@ -61,6 +79,7 @@ class Result:
         sensors: Path of the sensor file of each channel; empty for frames that the prefilter excluded.
         interval: How far the interval goes on; None for a frame.
         density: How typical it is, where that was asked for.
+        recorded: Of a match what the program records, by name; None where nobody asks for it.
     """
 
     frame: str
@@ -70,10 +89,12 @@ class Result:
     sensors: Mapping[str, str] = field(default_factory=dict[str, str])
     interval: IntervalSpan | None = None
     density: LogDensity | None = None
+    recorded: Mapping[str, Recorded] | None = None
 
     def __reduce__(self) -> tuple[type[Result], tuple[Any, ...]]:
         """Pickled as a call, which takes half the time; densities are computed where results arrive."""
-        return Result, (self.frame, self.recording, self.timestamp_us, self.verdict, self.sensors, self.interval)
+        told = (self.frame, self.recording, self.timestamp_us, self.verdict, self.sensors, self.interval)
+        return Result, told if self.recorded is None else (*told, None, self.recorded)
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,6 +112,33 @@ class Sample:
     unknown: Counter[str]
 
 
+@dataclass(frozen=True, slots=True)
+class Chosen:
+    """Which matches were chosen by what they carry.
+
+    Attributes:
+        where: The condition; "" where there is none.
+        sort: What they are ordered by; "" for nothing.
+        shown: How many there are.
+        others, unclear: How many are left out as they do not meet the condition, or nobody knows.
+        beyond: How many are left out as they come behind the limit of an order.
+        limit: The limit; None where there is none.
+    """
+
+    where: str
+    sort: str
+    shown: int
+    others: int
+    unclear: int
+    beyond: int
+    limit: int | None = None
+
+    @property
+    def left_out(self) -> int:
+        """How many are left out."""
+        return self.others + self.unclear + self.beyond
+
+
 @dataclass(slots=True)
 class Funnel:
     """How many frames are left after each step, and what the others failed at first.
@@ -106,11 +154,13 @@ class Funnel:
             "bindings" that these make, and bindings "cut off" because the recording or a track ends before the program
             does. Matches, unknowns and reasons are then those of intervals.
         broken: Of a query over time: how many bindings without a match broke which requirement.
+        unrecorded: Of each recorded value how often it is null, by the reason: `gap: not observed`.
         missing: Frames of the dataset in which a property that the program sets is missing, although others have it.
         warnings: What the user should know, such as a map that the program does not fit.
         cut: Whether the time was over before all frames were decided.
         limited: The match with which a limit ended the query; None where none did.
         sample: What the results were drawn from; None where all are shown.
+        chosen: Which matches were chosen by what they carry; None where that was not asked for.
     """
 
     frames: int = 0
@@ -122,11 +172,13 @@ class Funnel:
     reasons: Counter[str] = field(default_factory=Counter[str])
     over_time: Counter[str] = field(default_factory=Counter[str])
     broken: Counter[str] = field(default_factory=Counter[str])
+    unrecorded: Counter[str] = field(default_factory=Counter[str])
     missing: dict[str, int] = field(default_factory=dict[str, int])
     warnings: list[Diagnostic] = field(default_factory=list[Diagnostic])
     cut: bool = False
     limited: Result | None = None
     sample: Sample | None = None
+    chosen: Chosen | None = None
 
     def add(self, other: Funnel) -> None:
         """Count in what was found elsewhere."""
@@ -139,6 +191,7 @@ class Funnel:
         self.reasons.update(other.reasons)
         self.over_time.update(other.over_time)
         self.broken.update(other.broken)
+        self.unrecorded.update(other.unrecorded)
         self.missing.update(other.missing)
         self.cut = self.cut or other.cut
         self.warnings += [warning for warning in other.warnings if warning not in self.warnings]
@@ -147,6 +200,11 @@ class Funnel:
         """Count frames that the prefilter excludes."""
         self.frames += frames
         self.excluded[what] += frames
+
+    def count_recorded(self, result: Result) -> None:
+        """Count what is null of what a result carries."""
+        for name, each in (result.recorded or {}).items():
+            self.unrecorded.update({f"{name}: {reason}": number for reason, number in each.lacking.items()})
 
     def count_interval(self, verdict: Verdict) -> None:
         """Count a verdict on an interval."""

@@ -34,6 +34,7 @@ from scenicq.query.execution.frames_ahead import FramesAhead, telling
 from scenicq.query.execution.merged_blocks import merge_frames, merge_intervals, until_deadline
 from scenicq.query.execution.never_compared import Coverage, coverage
 from scenicq.query.execution.program_files import SiblingFiles
+from scenicq.query.execution.recorded_columns import RecordedColumn, columns_of
 from scenicq.query.execution.results import Funnel, Result
 from scenicq.query.prefilter.executor import Block, Extent, blocks, extents, names, whole_recordings
 from scenicq.query.prefilter.plan import Plan
@@ -237,9 +238,15 @@ class Query:
                 self.funnel.warnings.append(remark)
 
     def notes(self, maps: Iterable[str] | None = None) -> list[Diagnostic]:
-        """How the program is read where that hangs on the dataset, each thing once; arguments as of `fitting`."""
-        said = (each for compiled in self.fitting(maps) for each in compiled.scenario.warnings)
-        return [*{each.code: each for each in said if each.severity == "note"}.values()]
+        """How the program is read where that hangs on the dataset, and what it cannot record, each thing once.
+
+        Arguments as of `fitting`.
+        """
+        scenarios = [compiled.scenario for compiled in self.fitting(maps)]
+        said = (each for scenario in scenarios for each in scenario.warnings)
+        left_out = (each for scenario in scenarios for each in scenario.ignored if each.code == "not-recorded")
+        by_place = {(each.message, each.span): each for each in left_out}
+        return [*{each.code: each for each in said if each.severity == "note"}.values(), *by_place.values()]
 
     def fitting(self, maps: Iterable[str] | None = None) -> Iterator[CompiledMap]:
         """The scenario over each map that it fits.
@@ -303,6 +310,11 @@ class Query:
         """Names of the scenario's objects, of all maps that it fits."""
         compiled = [each.scenario for each in self._compiled_maps().values() if isinstance(each, CompiledMap)]
         return tuple(dict.fromkeys(owner.name for scenario in compiled for owner in scenario.objects))
+
+    def recorded_columns(self) -> tuple[RecordedColumn, ...]:
+        """What the program records, over all maps that it fits."""
+        scenarios = [each.scenario for each in self._compiled_maps().values() if isinstance(each, CompiledMap)]
+        return columns_of(scenarios, over_time=any(map(self.over_time, scenarios)))
 
     def plans(self) -> list[Plan]:
         """The prefilter on each map."""
@@ -394,6 +406,7 @@ class Query:
                     merge = partial(merge_intervals, every=every, reasons=reasons)
                 with closing(merge(there.plan, hands.decide(cut, ahead.told), self.funnel, ahead.taken)) as merged:
                     for result in merged:
+                        self.funnel.count_recorded(result)
                         yield result
                         if left is not None and isinstance(result.verdict, Match):
                             left -= 1

@@ -37,15 +37,19 @@ def summarize(query: Query, count: ResultCount) -> ResultSummary:
     if sample is not None:
         complete = complete and sample.shown >= sample.of and not sample.unknown
         unknown = sample.unknown
+    chosen = funnel.chosen
     return ResultSummary(
-        complete=complete,
+        complete=complete and not (chosen and chosen.left_out),
         results=count.results,
         frames=sum(query.frames(name) for name in query.dataset.maps),
         unknown=dict(sorted(unknown.items())),
         all_matches=options.all_matches,
-        limit=options.limit or UNSET,
+        limit=(chosen.limit if chosen else options.limit) or UNSET,
         sample=UNSET if sample is None else sample.shown,
         sampled_from=UNSET if sample is None else sample.of,
+        where=(chosen.where if chosen else "") or UNSET,
+        sort=(chosen.sort if chosen else "") or UNSET,
+        left_out=chosen.left_out if chosen else 0,
         skipped=skipped,
         variables=_variables(query) if count.results else {},
     )

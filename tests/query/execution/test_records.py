@@ -12,12 +12,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scenicq.errors import CONTROL, DataError
+from scenicq.errors import CONTROL, DataError, Source
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown
-from scenicq.query.execution.records import FrameRecord, decode_record, json_text, record
+from scenicq.query.execution.recorded_columns import RecordedColumn, columns_of_records
+from scenicq.query.execution.records import FrameRecord, SeriesRecord, decode_record, json_text, read_record, record
 from scenicq.query.execution.result_files import read_records
 from scenicq.query.execution.result_tables import result_schema, roles_of
-from scenicq.query.execution.results import IntervalSpan, LogDensity, Result
+from scenicq.query.execution.results import IntervalSpan, LogDensity, Recorded, Result
 from scenicq_cli.formats import make_writer
 
 texts = st.text(st.characters(codec="utf-8"), max_size=8)
@@ -34,7 +35,24 @@ verdicts = (
 whole = st.integers(-(2**63), 2**63 - 1)
 spans = st.builds(IntervalSpan, names, whole, st.integers(1, 2**40), st.booleans())
 densities = st.builds(LogDensity, st.none() | finite, log_weight=st.none() | finite, reason=texts)
-results = st.builds(Result, names, names, whole, verdicts, named, st.none() | spans, st.none() | densities)
+cells = st.sampled_from([finite, st.booleans(), texts, st.tuples(finite, finite)])
+
+
+def recorded_of(values: list[object], reason: str, series: bool) -> Recorded:
+    missing = values.count(None)
+    return Recorded(tuple(values if series else values[:1]), series, {reason: missing} if missing else {})
+
+
+def recordings_of(kind: st.SearchStrategy[object]) -> st.SearchStrategy[Recorded]:
+    return st.builds(recorded_of, st.lists(st.none() | kind, min_size=1, max_size=4), names, st.booleans())
+
+
+# a program's names have neither
+plain_names = names.filter(lambda each: not CONTROL.search(each) and "\n" not in each)
+recorded = st.dictionaries(plain_names, cells.flatmap(recordings_of), min_size=1, max_size=3)
+results = st.builds(
+    Result, names, names, whole, verdicts, named, st.none() | spans, st.none() | densities, st.none() | recorded
+)
 
 
 @given(results, texts)
@@ -63,7 +81,10 @@ def test_every_format_is_read_back(tmp_path_factory, form, every, result):
     ranked, over_time = result.density is not None, result.interval is not None
     sink = io.BytesIO()
     roles = lambda: roles_of([told])  # noqa: E731
-    writer = make_writer(form, sink, roles, origin="town@1", ranked=ranked, over_time=over_time, every=every)
+    columns = lambda: columns_of_records([told])  # noqa: E731
+    writer = make_writer(
+        form, sink, roles, recorded=columns, origin="town@1", ranked=ranked, over_time=over_time, every=every
+    )
     writer.write(told)
     writer.finish()
     file = tmp_path_factory.mktemp("r") / f"r.{'csv' if form == 'spreadsheet' else form}"
@@ -75,11 +96,18 @@ def test_every_format_is_read_back(tmp_path_factory, form, every, result):
 
 
 def test_the_columns_are_the_fields():
-    schema = result_schema(("ego", "car"), ranked=True, every=True)
+    columns = (RecordedColumn("gap", "number", series=False), RecordedColumn("place", "vector", series=True))
+    schema = result_schema(("ego", "car"), ranked=True, every=True, recorded=columns)
     assert schema.names == [name for name in FrameRecord.__struct_fields__ if name not in ("dataset", "summary")]
     assert str(schema.field("witness").type) == "map<string, list<item: double>>"
     assert str(schema.field("cause").type) == "struct<what: string, detail: string, place: string, reason: string>"
     assert str(schema.field("correspondence").type) == "struct<ego: string, car: string>"
+    parts = "minimum: double, maximum: double, mean: double"
+    place = "list<item: double>"
+    series = f"struct<first: {place}, last: {place}, {parts}, values: list<item: {place}>>"
+    assert str(schema.field("recorded").type) == f"struct<gap: double, place: {series}>"
+    assert str(schema.field("unrecorded").type) == "map<string, map<string, int64>>"
+    assert not {"recorded", "unrecorded"} & {*result_schema(("ego",)).names}
     times = result_schema(("ego",), over_time=True)
     assert str(times.field("frames").type) == "struct<first: string, last: string, count: int64>"
     assert [str(times.field(name).type) for name in ("end_us", "open_ended")] == ["int64", "bool"]
@@ -119,3 +147,21 @@ def test_numbers_have_the_fewest_digits():
     values = (0.1, 1e-7, 3.0, math.pi)
     told = record(Result("f", "r", 1, Match({}, {str(n): value for n, value in enumerate(values)})))
     assert [json.loads(json_text(told))["witness"][str(n)] for n in range(4)] == list(values)
+
+
+@given(results)
+def test_a_result_is_made_again(result):
+    again = read_record(decode_record(json_text(record(result))), Source("p.scenic", ""))
+    assert (again.recorded is None) == (result.recorded is None)
+    told, own = record(again), record(result)
+    assert (told.recorded, told.unrecorded) == (own.recorded, own.unrecorded)
+
+
+def test_a_series_has_its_ends_and_what_lies_between():
+    values = (3.0, None, -1.0, 7.5)
+    recorded = {"gap": Recorded(values, series=True, lacking={"not observed": 1})}
+    span = IntervalSpan("f3", 3, 4, open_ended=False)
+    told = record(Result("f", "r", 1, Match({}, {}), interval=span, recorded=recorded))
+    assert told.recorded["gap"] == SeriesRecord(3.0, 7.5, -1.0, 7.5, (3.0 - 1.0 + 7.5) / 3, list(values))
+    of_frame = record(Result("f", "r", 1, Match({}, {}), recorded={"gap": Recorded((3.0,), series=True)}))
+    assert of_frame.recorded == {"gap": 3.0}
