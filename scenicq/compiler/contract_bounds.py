@@ -33,6 +33,7 @@ BOUNDS: dict[str, Bound] = {
     "speed": Bound(1.0, "m/s", "how far a speed may be from a target", "to be measured"),
     "speed share": Bound(0.15, "1", "or this share of the target", "to be measured"),
     "set speed": Bound(0.5, "m/s", "how far a speed may be from one that is set", "to be measured"),
+    "held": Bound(5.0, "m/s", "how far above a target a speed may be that is held", "to be measured"),
     "change": Bound(0.1, "m/s²", "from which acceleration a speed is gained, or lost", "to be measured"),
     "brake": Bound(0.1, "m/s²", "acceleration of who brakes, at most", "to be measured"),
     "rest": Bound(0.5, "m/s", "below which an object is at rest", "to be measured"),

@@ -266,7 +266,7 @@ class _Motion:
         return _either(self.compare(op, now, by_margin), self.compare(op, now, by_share))
 
     def approaches(self, target: Node, where_else: Node | None = None, other: Node | None = None) -> Node:
-        """The speed is near a target, or approaches it.
+        """The speed is near a target, or approaches it; or it is above it, and is held.
 
         Args:
             target: The target.
@@ -280,8 +280,13 @@ class _Motion:
             fast = _both(where_else, self.at_most(other, margin))
         return _both(
             _either(self.at_least(target, margin), self.gains(), slow),
-            _either(self.at_most(target, margin), self.loses(), fast),
+            _either(self.at_most(target, margin), self.loses(), fast, self.holds(target)),
         )
+
+    def holds(self, target: Node) -> Node:
+        """The object is faster than a target, by not too much, and does not get faster still."""
+        most = build.add(target, build.constant(_bound("held")), self.span)
+        return _both(self.compare(CompareOp.LE, self.observed("speed"), most), self.brakes())
 
     def has_speed(self, speed: Node) -> Node:
         """The speed is one that was set, whatever its sign."""
@@ -425,10 +430,10 @@ def _set_transform(motion: _Motion, pos: ModelValue, heading: ModelValue) -> Con
 
 
 def _offset(motion: _Motion, offset: ModelValue) -> Contract:
-    """Moved by so much at each step, an object has a velocity."""
+    """Moved by so much at each step, an object has a velocity, or goes on saying that it has none."""
     per_second = build.scale(to_vector(offset, motion.span), build.constant(1.0 / _step_s(motion)), motion.span)
     wanted = build.rotate(per_second, to_heading(motion.agent, motion.span), motion.span)
-    return Contract(motion.name, _has_velocity(motion, wanted))
+    return Contract(motion.name, _either(_has_velocity(motion, wanted), motion.rests()))
 
 
 def _step_s(motion: _Motion) -> float:
