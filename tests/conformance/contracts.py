@@ -33,6 +33,7 @@ from scenicq.compiler.imports import Modules
 from scenicq.compiler.interpreter import Interpreter
 from scenicq.compiler.temporal import TimedStatements
 from scenicq.errors import Source, Span
+from scenicq.forest import build
 from scenicq.forest.nodes import Compare, Constant, Logic, LogicOp, Node
 from scenicq.forest.show import show
 from scenicq.forest.walk import postorder
@@ -269,16 +270,14 @@ def contract_of(case: Case, names: Mapping[str, int], network: Network, objects:
     return made[case.phase] if isinstance(made, tuple) else made
 
 
-def truths(columns: AtomColumns, contract: Contract, entry: int) -> NDArray[np.int8]:
+def truths(columns: AtomColumns, contract: Contract, entry: int, agent: int = 0) -> NDArray[np.int8]:
     """Whether a contract is shown at each sample, for a mode that is entered at one."""
     shown = np.full(len(columns.samples), TRUE) if contract.shows is None else columns.truth_of(contract.shows)
     if contract.shows_from is None:
         return shown
-    numbers = [columns.number(each) for each in contract.entered]
-    read = [float(each[entry]) for each in numbers if each is not None]
-    if len(read) < len(numbers) or np.isnan(read).any():
-        return np.minimum(shown, UNKNOWN)
-    return np.minimum(shown, columns.truth_of(contract.shows_from(tuple(map(round, read)))))
+    x, y = (float(each[entry]) for each in columns.samples.observed(agent, "position") or ())
+    kept = contract.shows_from(build.constant((x, y)))
+    return np.minimum(shown, columns.truth_of(kept))
 
 
 def missed(
