@@ -208,8 +208,8 @@ class Seen:
         return at_most(self.speed, max(target + 1.0, 1.15 * target))
 
     def approaches(self, target: float, where: Truth = 0.0, other: float = 0.0) -> Truth:
-        gains, loses = at_most(0.1, self.acceleration), at_most(self.acceleration, -0.1)
-        held = both(at_most(self.speed, target + 5.0), self.brakes())
+        gains, loses = at_most(0.3, self.acceleration), at_most(self.acceleration, -0.3)
+        held = both(at_most(self.speed, target + 3.0), self.brakes())
         slow = either(self.fast_enough(target), gains, both(where, self.fast_enough(other)))
         return both(slow, either(self.slow_enough(target), loses, both(where, self.slow_enough(other)), held))
 
@@ -217,7 +217,7 @@ class Seen:
         return at_most(self.speed, np.nextafter(0.5, 0))
 
     def brakes(self) -> Truth:
-        return either(at_most(self.acceleration, 0.1), self.rests())
+        return either(at_most(self.acceleration, 0.2), self.rests())
 
     def has_speed(self, speed: float) -> Truth:
         return both(
@@ -243,9 +243,9 @@ def crosses(seen: Seen, other: Seen) -> Truth:
     right = (seen.x - other.x) * np.cos(other.heading) + (seen.y - other.y) * np.sin(other.heading)
     ahead = -(seen.x - other.x) * np.sin(other.heading) + (seen.y - other.y) * np.cos(other.heading)
     in_time = right * other.speed / ahead
-    fast = either(at_most(min(1.0 - 0.5, 0.85), seen.speed), at_most(0.1, seen.acceleration))
+    fast = either(at_most(min(1.0 - 0.5, 0.85), seen.speed), at_most(0.3, seen.acceleration))
     most = np.where(np.isnan(in_time), np.nan, np.maximum(in_time + 0.5, 1.15 * in_time))
-    slow = either(at_most(seen.speed, 1.5), at_most(seen.speed, most), at_most(seen.acceleration, -0.1))
+    slow = either(at_most(seen.speed, 1.5), at_most(seen.speed, most), at_most(seen.acceleration, -0.3))
     return both(fast, slow, seen.ahead())
 
 
