@@ -23,7 +23,7 @@ from __future__ import annotations
 import inspect
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, cast
 
 from scenicq.compiler import operators
@@ -579,10 +579,12 @@ def _follow_lane(
     over = None if against else _leads_nowhere(motion)
     if laneToFollow is not None:
         kept = motion.in_course_of(laneToFollow, "laneToFollow", against=against)
-        return Contract(motion.name, _both(shows, kept), over=over)
+        return Contract(motion.name, _both(shows, kept), settles_s=_bound("lane window"), over=over)
     on_lanes = motion.within(motion.run.network.drivableRegion, _bound("lane"))
-    keeps = _keeps_lane(motion, against=against)
-    return Contract(motion.name, _both(shows, on_lanes), over=over, shows_from=keeps)
+    return Contract(
+        motion.name, _both(shows, on_lanes), settles_s=_bound("lane window"), over=over,
+        shows_from=_keeps_lane(motion, against=against),
+    )  # fmt: skip
 
 
 def _keeps_lane(motion: _Motion, *, against: bool = False) -> Callable[[Node], Node]:
@@ -630,7 +632,7 @@ def _follow_trajectory(
     )
     end = motion.away(motion.behind(lanes[-1], "trajectory"))
     over = motion.compare(CompareOp.LT, end, _bound("trajectory end"))
-    return Contract(motion.name, shows, over=over)
+    return Contract(motion.name, shows, settles_s=_bound("lane window"), over=over)
 
 
 def _turn(motion: _Motion, trajectory: ModelValue, target_speed: ModelValue = 6) -> Contract:
@@ -687,10 +689,7 @@ def _drive_avoiding_collisions(
         for each in others
     ]
     avoids = _both(_either(*near), motion.brakes()) if near else None
-    return Contract(
-        motion.name, _either(follows.shows, avoids), over=follows.over,
-        shows_from=follows.shows_from,
-    )  # fmt: skip
+    return replace(follows, shows=_either(follows.shows, avoids))
 
 
 def _crossing(

@@ -434,6 +434,14 @@ def test_behaviors_are_over_where_scenic_says(seed):
     assert (over(turns, tracks)[~known] == 0.5).all()
 
 
+def test_windows():
+    goes = [lane(name) for name in GOES]
+    kept = [("FollowLaneBehavior", (10,)), ("FollowLaneBehavior", (10, lane("west-in-0"))),
+            ("FollowTrajectoryBehavior", (10, goes)), ("DriveAvoidingCollisions", ())]  # fmt: skip
+    assert {contracts(name, EGO, *args)[0].settles_s for name, args in kept} == {2.0}
+    assert contracts("SetBrakeAction", EGO, 1)[0].settles_s == 1.0
+
+
 # --- names and arguments
 
 SCENIC = {
@@ -529,6 +537,11 @@ def test_unknown_names_are_left_to_the_caller():
     assert behavior_contract(run, "SetBrakeAction", run.objects[0], (1,), {}, span) is None
 
 
-def test_bounds_say_what_they_rest_on():
-    assert all(each.evidence and each.meaning and each.unit for each in BOUNDS.values())
-    assert not any("to be measured" in each.evidence for each in BOUNDS.values())
+def test_page_has_the_bounds():
+    page = Path(__file__).parents[1] / "language" / "contracts.md"
+    rows = [line for line in page.read_text(encoding="utf-8").split("## Bounds")[1].splitlines() if line[:2] == "| "]
+    expected = [
+        f"| {name} | {each.value:g} {each.unit} | {each.meaning} | {each.evidence} |" for name, each in BOUNDS.items()
+    ]
+    assert rows[1:] == expected
+    assert all(each.evidence and each.meaning for each in BOUNDS.values())
