@@ -31,8 +31,9 @@ class ContractBound:
 BOUNDS: dict[str, ContractBound] = {
     "window": ContractBound(1.0, "s", "how long no sample must show a contract until it is broken",
                     "the least time over which the store takes a slope of speed"),
-    "lane window": ContractBound(2.0, "s", "the same where a lane is kept",
-                                 "simulated: sharp bends are cut for up to 1.3 s at 10 m/s, over the lane beside"),
+    "lane window": ContractBound(2.0, "s", "the same where a lane is kept, or changed",
+                                 "simulated: sharp bends are cut for up to 1.3 s at 10 m/s, over the lane beside; "
+                                 "a change of lanes may swing off the road for over a second"),
     "speed": ContractBound(1.0, "m/s", "how far a speed may be from a target",
                    "simulated: at most 0.5 m/s above it once reached, for targets of 5 to 20 m/s"),
     "speed share": ContractBound(0.15, "of the target", "or this share of it", "simulated: 2.6 % to 10.2 % above it"),

@@ -671,7 +671,7 @@ def _change_lane(
     )
     middle = motion.within(motion.each(laneSectionToSwitch, line), _bound("arrived"))
     return Contract(
-        motion.name, shows, over=middle,
+        motion.name, shows, settles_s=_bound("lane window"), over=middle,
         shows_from=lambda place: _either(new, from_old(place)),
     )  # fmt: skip
 

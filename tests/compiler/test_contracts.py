@@ -437,7 +437,8 @@ def test_behaviors_are_over_where_scenic_says(seed):
 def test_windows():
     goes = [lane(name) for name in GOES]
     kept = [("FollowLaneBehavior", (10,)), ("FollowLaneBehavior", (10, lane("west-in-0"))),
-            ("FollowTrajectoryBehavior", (10, goes)), ("DriveAvoidingCollisions", ())]  # fmt: skip
+            ("FollowTrajectoryBehavior", (10, goes)), ("DriveAvoidingCollisions", ()),
+            ("LaneChangeBehavior", (program()[1]["sections"]["west-in-1"],))]  # fmt: skip
     assert {contracts(name, EGO, *args)[0].settles_s for name, args in kept} == {2.0}
     assert contracts("SetBrakeAction", EGO, 1)[0].settles_s == 1.0
 
