@@ -328,6 +328,8 @@ class Interpreter:
                 self.dynamic("simulator", node.span)
             case ast.DynamicStatement() | ast.DynamicDefinition() | ast.RequireMonitor() if self.timed is not None:
                 timed_statement(self, self.timed, node, scope)
+            case ast.Take() | ast.Do() | ast.TryInterrupt():
+                self.dynamic(node.kind, node.span)
             case ast.DynamicStatement() | ast.DynamicDefinition() | ast.RequireMonitor():
                 self.dynamic("require monitor" if isinstance(node, ast.RequireMonitor) else node.kind, node.span)
                 if isinstance(node, ast.DynamicDefinition) and node.name:
