@@ -144,8 +144,8 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @click.option("--scenic", type=option_type("scenic"), help="Version of Scenic.  [default: inferred]")
 @MAP_DEFAULTS
 @click.option("--initial", is_flag=True, help="Ignore behaviors and other dynamic parts: match the initial scene.")
-@click.option("--behaviors", type=click.Choice(["ignore"]), help="ignore leaves behaviors out and matches the rest of "
-              "a dynamic program over time.")
+@click.option("--behaviors", type=click.Choice(["guards", "ignore"]), help="guards runs the behaviors of a dynamic "
+              "program, whatever their actions are; ignore leaves them out.  [default: guards]")
 @click.option("--min-duration", metavar="S", type=option_type("min_duration"), help="Find intervals of at least S "
               "seconds: of a program about one instant, those in which every frame matches with the same objects.")
 @click.option("--intervals", type=option_type("intervals"), default="longest",

@@ -138,7 +138,7 @@ class Lookups:
         """Start with none."""
         self.tables: dict[object, LookupTable] = {}
         self.indices: dict[tuple[object, object], Node] = {}
-        self.ranks: dict[tuple[str, object], Index] = {}
+        self.ranks: dict[tuple[object, ...], Index] = {}
         self.known: dict[tuple[int, str], Constant | None] = {}
         self._kept: list[Node] = []
 
@@ -150,7 +150,7 @@ class Lookups:
 
     def index(self, key: object, table: LookupTable, place: Node, span: Span) -> Node:
         """Which option lies at a random place."""
-        where = (place.object, place.property) if isinstance(place, Feature) else id(place)
+        where = (place.object, place.property, place.current) if isinstance(place, Feature) else id(place)
         if (key, where) not in self.indices:
             self._kept.append(place)
             self.indices[key, where] = self._make_index(table, place, where, span)
@@ -169,5 +169,6 @@ class Lookups:
         rank = self.ranks.setdefault((table.family, where), Index((1.0,) * options.depth, span=span))
         if len(rank.weights) < options.depth:
             # more overlap here than the ranks of the family tell apart
-            rank = Index((1.0,) * options.depth, span=span)
+            wide = (table.family, where, options.depth)
+            rank = self.ranks.setdefault(wide, Index((1.0,) * options.depth, span=span))
         return Select(rank, tuple(number(n) for n in range(len(rank.weights))), span=span)

@@ -84,7 +84,7 @@ KINDS: Mapping[str, OptionKind] = {
     "initial": Flag(),
     "map_defaults": Flag(),
     "ignore_params": Text("names of parameters, separated by commas"),
-    "behaviors": OneOf(("refuse", "ignore")),
+    "behaviors": OneOf(("motion", "guards", "ignore")),
     "min_duration": Amount("s"),
     "intervals": OneOf(get_args(Intervals)),
     "gap": Amount("s", above=True),
@@ -166,5 +166,5 @@ def read_options(**given: Unpack[OptionTexts]) -> QueryOptions:
     )  # fmt: skip
     values: dict[str, Any] = {name: value for name, value in read.items() if name in same}
     version = None if scenic is None else VERSIONS[scenic]
-    behaviors: Behaviors = read.get("behaviors") or "refuse"
+    behaviors: Behaviors = read.get("behaviors") or "guards"
     return QueryOptions(match=options, version=version, behaviors=behaviors, time=time, **values)

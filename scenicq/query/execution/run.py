@@ -65,7 +65,7 @@ class QueryOptions:
         limit: Matches after which to stop; None for all.
         every: Whether frames that do not match are results too.
         all_matches: Whether every correspondence of a frame is a result of its own.
-        behaviors: Whether a program with behaviors is refused, or matched over time without them.
+        behaviors: What becomes of the behaviors of a program over time.
         time: Options of intervals.
         model: The world model of a program that imports none.
         strict: Whether what the program sets and no label has is an error.
@@ -87,7 +87,7 @@ class QueryOptions:
     limit: int | None = None
     every: bool = False
     all_matches: bool = False
-    behaviors: Behaviors = "refuse"
+    behaviors: Behaviors = "guards"
     time: IntervalOptions = field(default_factory=IntervalOptions)
     model: str | None = None
     strict: bool = False
