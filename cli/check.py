@@ -143,7 +143,7 @@ def _found(
                 network,
                 version=version,
                 initial=initial,
-                behaviors="guards",
+                behaviors="motion",
                 loader=loader,
                 model=asked.model,
                 map_defaults=asked.map_defaults,

@@ -14,7 +14,7 @@ from scenicq.errors import Span
 from scenicq.syntax import ast
 
 __all__ = [
-    "LIBRARY_NAMES", "BehaviorDefinition", "CoroutineCall", "CoroutineDefinition", "LibraryCall", "LibraryName", "MonitorDefinition",
+    "BehaviorDefinition", "CoroutineCall", "CoroutineDefinition", "LibraryCall", "LibraryName", "MonitorDefinition",
     "as_behavior",
 ]  # fmt: skip
 
@@ -81,17 +81,6 @@ class LibraryCall:
     positional: tuple[ModelValue, ...]
     named: Mapping[str, ModelValue]
     span: Span
-
-
-LIBRARY_NAMES = frozenset(
-    """AccelerateForwardBehavior AutopilotBehavior ConstantThrottleBehavior CrossingBehavior DriveAvoidingCollisions
-    FollowLaneBehavior FollowTrajectoryBehavior LaneChangeBehavior TurnBehavior WalkBehavior WalkForwardBehavior
-    OffsetAction RegulatedControlAction SetAutopilotAction SetBrakeAction SetGearAction SetHandBrakeAction
-    SetManualFirstGearShiftAction SetManualGearShiftAction SetPositionAction SetReverseAction SetSpeedAction
-    SetSteerAction SetThrottleAction SetTrafficLightAction SetVehicleLightStateAction SetVelocityAction SetWalkAction
-    SetWalkingDirectionAction SetWalkingSpeedAction WalkTowardsAction SteerAction""".split()
-)
-"""Behaviors and actions of Scenic's libraries."""
 
 
 def as_behavior(value: ModelValue, span: Span) -> ModelValue:

@@ -11,10 +11,11 @@ from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.forest.nodes import ArithmeticOp, Constant, DirectionAt, Feature, Index, Node, Select
 from scenicq.geometry import shapes
-from scenicq.geometry.elements import Intersection, Maneuver, NetworkElement
+from scenicq.geometry.elements import Intersection, Lane, Maneuver, NetworkElement
 from scenicq.geometry.network import Network
 from scenicq.geometry.occupancy import TOLERANCE, ElementAtPoint, Layer, Occupancy
 from scenicq.geometry.passing_lanes import areas_at, areas_everywhere
+from scenicq.geometry.regions import PolygonSet
 from scenicq.geometry.shapes import Shape
 
 __all__ = ["LOOKUPS", "LookupEntry", "LookupTable", "Lookups", "own", "ways_at", "ways_everywhere"]
@@ -132,6 +133,7 @@ class Lookups:
         indices: Which option lies at a place, by look-up and place; places are kept so that they stay what they are.
         ranks: Which of several elements that overlap, by family and place.
         known: Properties of objects, by index and name: their values, or None for those that are random.
+        courses: Where a driver who keeps to a lane comes to, by the lane and whether it is driven against its way.
     """
 
     def __init__(self) -> None:
@@ -140,6 +142,7 @@ class Lookups:
         self.indices: dict[tuple[object, object], Node] = {}
         self.ranks: dict[tuple[object, ...], Index] = {}
         self.known: dict[tuple[int, str], Constant | None] = {}
+        self.courses: dict[tuple[Lane, bool], PolygonSet] = {}
         self._kept: list[Node] = []
 
     def table(self, key: object, name: str, family: str, layers: Callable[[], list[list[LookupEntry]]]) -> LookupTable:
@@ -156,7 +159,8 @@ class Lookups:
             self.indices[key, where] = self._make_index(table, place, where, span)
         return self.indices[key, where]
 
-    def _make_index(self, table: LookupTable, place: Node, where: object, span: Span) -> Node:
+    def numbers(self, table: LookupTable, place: Node, span: Span, count: int | None = None) -> tuple[Node, ...]:
+        """The numbers of the options at a place, by rank: all, or so many of them; after the last the first again."""
         options = table.occupancy
         scale = build.constant(float(options.scale), span)
 
@@ -164,11 +168,15 @@ class Lookups:
             angle = DirectionAt(build.constant(ElementAtPoint(options, rank), span), place, span=span)
             return build.arithmetic(ArithmeticOp.MUL, angle, scale, span=span)
 
-        if options.depth == 1:
-            return number(0)
-        rank = self.ranks.setdefault((table.family, where), Index((1.0,) * options.depth, span=span))
-        if len(rank.weights) < options.depth:
+        return tuple(map(number, range(options.depth if count is None else count)))
+
+    def _make_index(self, table: LookupTable, place: Node, where: object, span: Span) -> Node:
+        depth = table.occupancy.depth
+        if depth == 1:
+            return self.numbers(table, place, span)[0]
+        rank = self.ranks.setdefault((table.family, where), Index((1.0,) * depth, span=span))
+        if len(rank.weights) < depth:
             # more overlap here than the ranks of the family tell apart
-            wide = (table.family, where, options.depth)
-            rank = self.ranks.setdefault(wide, Index((1.0,) * options.depth, span=span))
-        return Select(rank, tuple(number(n) for n in range(len(rank.weights))), span=span)
+            wide = (table.family, where, depth)
+            rank = self.ranks.setdefault(wide, Index((1.0,) * depth, span=span))
+        return Select(rank, self.numbers(table, place, span, len(rank.weights)), span=span)

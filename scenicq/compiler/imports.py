@@ -7,7 +7,8 @@ go up from the package of the file that has them, and a module that is still bei
 from __future__ import annotations
 
 from scenicq.compiler.builtins import language_names
-from scenicq.compiler.coroutines import LIBRARY_NAMES, LibraryName
+from scenicq.compiler.contracts import ACTIONS, BEHAVIORS
+from scenicq.compiler.coroutines import LibraryName
 from scenicq.compiler.environment import FIRST_LIBRARIES, Environment
 from scenicq.compiler.imported_files import ImportedFiles, Loader, absolute, packages
 from scenicq.compiler.interpreter import Interpreter
@@ -142,7 +143,7 @@ class Modules:
         """What a name of a module of behaviors and actions stands for, where behaviors are followed; else nothing."""
         timed = self.interpreter.timed
         followed = timed is not None and timed.behaviors != "ignore"
-        return LibraryName(name, name.endswith("Action")) if followed else None
+        return LibraryName(name, name not in BEHAVIORS) if followed else None
 
     def _member(self, module: Module, alias: ast.ImportAlias) -> ModelValue:
         """What `from module import member` gives: a name of the module, else a module in its package."""
@@ -174,7 +175,7 @@ class Modules:
         scope = Environment(network_names(self._network, files[-1]) | records, self.base, library=True)
         for file in files:
             self.interpreter.run(library_text(file, map_defaults=self._map_defaults).body, scope)
-        names = {name: self._library_name(name) for name in LIBRARY_NAMES}
+        names = {name: self._library_name(name) for name in ACTIONS | BEHAVIORS}
         return Module(name, names | {key: value for key, value in scope.names.items() if not key.startswith("_")})
 
     def _package(self, name: str) -> Module | None:

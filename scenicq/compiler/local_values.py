@@ -10,6 +10,7 @@ from collections.abc import Callable, Hashable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import cast
 
+from scenicq.compiler.contracts import Contract
 from scenicq.compiler.coroutines import CoroutineCall, LibraryCall
 from scenicq.compiler.unread import NoValue
 from scenicq.compiler.values import Choice, Function, Instance, LabelObjects, ModelValue, OtherList, fail, is_node
@@ -51,11 +52,24 @@ class LocalValues:
     drawn_after: int
     ranks: Callable[[], Iterable[Index]]
     numbers: ValueNumbers = field(default_factory=ValueNumbers)
-    _alive: list[object] = field(default_factory=list[object])
+    _keys: dict[int, tuple[object, Hashable]] = field(default_factory=dict["int", "tuple[object, Hashable]"])
+    _aged: dict[tuple[int, str, bool], tuple[object, Held]] = field(
+        default_factory=dict["tuple[int, str, bool]", "tuple[object, Held]"]
+    )
 
     def hold(self, value: ModelValue) -> Held:
         """A value."""
-        return Held(self._key(value), value)
+        # what may change is looked at again
+        if isinstance(value, list | dict | set):
+            return Held(self._key(value), value)
+        if id(value) not in self._keys:
+            self._keys[id(value)] = value, self._key(value)
+        return Held(self._keys[id(value)][1], value)
+
+    def hold_contract(self, contract: Contract) -> Held:
+        """A contract: it is the same where it asks for the same."""
+        shows = None if contract.shows is None else self.numbers.expression(contract.shows)
+        return Held(("contract", contract.name, shows, contract.settles_s), contract)
 
     def _key(self, value: ModelValue) -> Hashable:
         match value:
@@ -78,7 +92,7 @@ class LocalValues:
             case _ if is_node(value):
                 return "node", self.numbers.expression(cast(Node, value))
             case _:
-                self._alive.append(value)
+                self._keys.setdefault(id(value), (value, ("id", id(value))))
                 return "id", id(value)
 
     def copied(self, value: ModelValue) -> ModelValue:
@@ -99,6 +113,12 @@ class LocalValues:
             place: Where it is, in words that are no other variable's.
             first: Whether the sample is the first one, which is kept.
         """
+        asked = id(held.value), place, first
+        if asked not in self._aged or isinstance(held.value, list | dict | set):
+            self._aged[asked] = held.value, self._made_old(held, place, first=first)
+        return self._aged[asked][1]
+
+    def _made_old(self, held: Held, place: str, *, first: bool) -> Held:
         if not any(map(_is_current, postorder(self.nodes(held.value)))):
             return held
 

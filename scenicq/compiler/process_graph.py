@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, TypeAlias, TypeVar, cast
 
 from scenicq.compiler.assignment import assign
 from scenicq.compiler.coerce import read_over_time, to_boolean
+from scenicq.compiler.contracts import Contract, action_contract, behavior_contract
 from scenicq.compiler.coroutines import CoroutineCall, LibraryCall, MonitorDefinition, as_behavior
 from scenicq.compiler.courses import split, without_courses
 from scenicq.compiler.environment import Environment
@@ -28,7 +29,7 @@ from scenicq.compiler.scoping import own_names
 from scenicq.compiler.values import Choice, Delayed, Function, Instance, ModelValue, describe, fail
 from scenicq.errors import Span
 from scenicq.forest import build
-from scenicq.forest.nodes import PAST, CompareOp, Constant, Feature, Identity, Index, Leaf, Node
+from scenicq.forest.nodes import CompareOp, Constant, Feature, Identity, Index, Leaf, Node
 from scenicq.forest.temporal import (
     Arm,
     Atom,
@@ -129,9 +130,17 @@ class _Call:
 
 @dataclass(frozen=True, slots=True)
 class _Library:
-    """A behavior of the libraries that runs."""
+    """A behavior of the libraries that runs.
+
+    Attributes:
+        call: Its call.
+        phase: The number of its phase.
+        lasted: For how many samples, as far as that matters.
+    """
 
     call: Held
+    phase: int = 0
+    lasted: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,6 +180,8 @@ class _State:
         guards: Conditions that are asked next, of the call with the number after them.
         of: This number.
         first: Whether the sample is the first one.
+        modes: What must have been shown since the sample before, each with its timer.
+        seen: How many of these have been looked at; -1 where they have not to be.
     """
 
     frames: tuple[_Frame, ...]
@@ -179,6 +190,8 @@ class _State:
     guards: tuple[ast.DynamicStatement, ...] = ()
     of: int = -1
     first: bool = True
+    modes: tuple[tuple[Held, int], ...] = ()
+    seen: int = -1
 
 
 @dataclass(frozen=True, slots=True)
@@ -215,8 +228,8 @@ class _Timed:
     """Whether the time of a timer is over."""
 
     timer: int
-    then: _State
-    otherwise: _State
+    then: _Next
+    otherwise: _Next
 
 
 @dataclass(frozen=True, slots=True)
@@ -225,7 +238,8 @@ class _Started:
 
     timer: int
     after_s: float
-    then: _State
+    then: _Next
+    extends: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -252,6 +266,7 @@ class _Graph:
         names: What it sees besides the program's names.
         span: Where the program makes it run.
         actions: Takes the actions that constrain nothing, each with its place.
+        reaction_s: Seconds after which what it does must be shown; None where nothing must.
     """
 
     run: Interpreter
@@ -262,9 +277,13 @@ class _Graph:
     names: dict[str, ModelValue]
     span: Span
     actions: dict[str, Span]
+    reaction_s: float | None
     steps: list[Step] = field(default_factory=list[Step])
     loose: set[int] = field(default_factory=set[int])
     _asked: dict[Hashable, tuple[Node, _Guards]] = field(default_factory=dict["Hashable", "tuple[Node, _Guards]"])
+    _contracts: dict[Hashable, tuple[tuple[Contract, ...], _Guards]] = field(
+        default_factory=dict["Hashable", "tuple[tuple[Contract, ...], _Guards]"]
+    )
     _numbers: dict[_State, int] = field(default_factory=dict["_State", int])
     _todo: list[tuple[int, _State]] = field(default_factory=list["tuple[int, _State]"])
 
@@ -333,11 +352,12 @@ class _Graph:
             case _Ways():
                 return Choose(tuple(dict.fromkeys(map(self.placed, found.options))))
             case _Timed():
-                return Due(found.timer, self.number(found.then), self.number(found.otherwise))
+                return Due(found.timer, self.placed(found.then), self.placed(found.otherwise))
             case _Started():
-                return Arm(found.timer, found.after_s, self.number(found.then))
+                return Arm(found.timer, found.after_s, self.placed(found.then), found.extends)
             case _Waits():
-                return Wait(self.number(found.then), tuple(sorted(_timers(found.then.frames))))
+                timers = _timers(found.then.frames) | {timer for _, timer in found.then.modes}
+                return Wait(self.number(found.then), tuple(sorted(timers)))
             case _State():
                 return Goto(self.number(found))
             case _:
@@ -461,6 +481,8 @@ class _Graph:
     def advance(self, state: _State) -> _Next:
         """What a state does first."""
         self.run.budget.step(self.span)
+        if state.seen >= 0:
+            return self.shown(state)
         if state.guards:
             first, *others = state.guards
             assert first.operand is not None
@@ -556,10 +578,41 @@ class _Graph:
         body = frame.body if block == len(frame.handlers) else frame.handlers[block]
         return replace(state, frames=(*state.frames[:at], switched, _Block(body)), resumed=-1, asked=-1)
 
-    def waits(self, rest: _State) -> _Waits:
-        """Go on with a state at the next sample."""
+    def waits(self, rest: _State, contracts: Sequence[Contract] = ()) -> _Next:
+        """Go on with a state at the next sample, by when some contracts must be kept."""
         frames = self.aged(rest.frames, "", first=rest.first)
-        return _Waits(replace(rest, frames=frames, resumed=0, asked=-1, first=False))
+        found: list[tuple[Held, int]] = []
+        used = _timers(rest.frames) | {timer for _, timer in rest.modes}
+        started: list[tuple[int, float]] = []
+        for contract in contracts if self.reaction_s is not None else ():
+            if contract.shows is None:
+                continue
+            held = self.values.hold_contract(contract)
+            timer = dict(rest.modes).get(held)
+            if timer is None:
+                timer = next(number for number in range(LIMITS.process_steps) if number not in used)
+                used.add(timer)
+                started.append((timer, cast(float, self.reaction_s) + contract.settles_s))
+            found.append((held, timer))
+        modes = tuple(found)
+        after: _Next = _Waits(
+            replace(rest, frames=frames, resumed=0, asked=-1, first=False, modes=modes, seen=0 if modes else -1)
+        )
+        for timer, after_s in started:
+            after = _Started(timer, after_s, after)
+        return after
+
+    def shown(self, state: _State) -> _Next:
+        """Ask whether a contract is kept: it is not if for some time no sample has shown what it asks for."""
+        if state.seen == len(state.modes):
+            return replace(state, seen=-1)
+        held, timer = state.modes[state.seen]
+        contract = cast(Contract, held.value)
+        following = replace(state, seen=state.seen + 1)
+        kept = _Started(timer, contract.settles_s, following, extends=True)
+        broken = _Timed(timer, Reject(self.span), following)
+        assert contract.shows is not None
+        return self.test(state, contract.shows, (), kept, broken, self.span)
 
     def aged(self, frames: tuple[_Frame, ...], place: str, *, first: bool) -> tuple[_Frame, ...]:
         """Frames at the next sample."""
@@ -578,7 +631,7 @@ class _Graph:
                     items = tuple(old(held, f"item {count}") for count, held in enumerate(frame.items))
                     found.append(replace(frame, items=items))
                 case _Library():
-                    found.append(_Library(old(frame.call, "call")))
+                    found.append(replace(frame, call=old(frame.call, "call")))
                 case _Block():
                     found.append(_Block(tuple(self.old_statement(each, old) for each in frame.body)))
                 case _Try():
@@ -602,13 +655,38 @@ class _Graph:
                 return node
 
     def library(self, state: _State, frame: _Library, below: _State) -> _Next:
-        """What a behavior of the libraries does: what it ends by is not known."""
-        over = Feature(
-            0 if self.agent is None else cast(int, self.agent.index),
-            f"{PAST}end {self.values.numbers.number(frame.call.key)} in {self.values.process}", "boolean",
-            current=True,
-        )  # fmt: skip
-        return _Asked(build.compare(CompareOp.EQ, over, build.constant(True)), (), below, self.waits(state), loose=True)
+        """What a behavior of the libraries does: it goes through its phases, each over by a condition."""
+        contracts, guards = self.contracts_of(frame.call)
+        if frame.phase == len(contracts):
+            return below
+        contract = contracts[frame.phase]
+        following = self.pushed(below, _Library(frame.call, frame.phase + 1))
+        lasting = self.pushed(below, replace(frame, lasted=min(frame.lasted + 1, contract.least_steps)))
+        if contract.over is None or frame.lasted < contract.least_steps:
+            found = self.waits(lasting, (contract,))
+        else:
+            found = self.test(state, contract.over, (), following, self.waits(lasting, (contract,)), self.span)
+        asked = guards if not frame.phase and not frame.lasted else ()
+        if asked:
+            return _Asked(build.constant(True), asked, found, found, loose=True)
+        return replace(found, loose=True) if isinstance(found, _Asked) else found
+
+    def contracts_of(self, held: Held) -> tuple[tuple[Contract, ...], _Guards]:
+        """The contracts of the phases of a behavior of the libraries."""
+        if held.key not in self._contracts:
+            call = cast(LibraryCall, held.value)
+            assert self.agent is not None
+            agent = self.agent
+            found, guards = self.excluding(
+                lambda: behavior_contract(self.run, call.of.name, agent, call.positional, call.named, call.span)
+            )
+            if found is None:
+                raise fail("unsupported-construct", f"the behavior `{call.of.name}` is not known", call.span,
+                           "is not followed over time")  # fmt: skip
+            self._contracts[held.key] = found, guards
+            if all(each.shows is None for each in found):
+                self.actions.setdefault(call.of.name, call.span)
+        return self._contracts[held.key]
 
     # --- statements
 
@@ -702,23 +780,56 @@ class _Graph:
 
     def take(self, state: _State, node: ast.Take, rest: _State) -> _Next:
         """Take actions."""
+        values: list[ModelValue] = []
         excluded: list[tuple[Node, Span]] = []
         for expression in node.actions:
             value, guards = self.evaluated(state, expression)
             excluded += guards
-            for action in value if isinstance(value, list | tuple) else (value,):  # pyright: ignore[reportUnknownVariableType]
-                self.action(action, expression.span)
-        found = self.waits(rest)
-        return _Asked(build.constant(True), tuple(excluded), found, found) if excluded else found
+            several = isinstance(value, list | tuple) and len(node.actions) == 1
+            values += list(cast("list[ModelValue]", value)) if several else [value]
 
-    def action(self, value: ModelValue, span: Span) -> None:
-        """Look at an action."""
+        def taken(actions: ModelValue) -> _Next:
+            contracts: list[Contract] = []
+            asked = list(excluded)
+            for action in cast("list[ModelValue]", actions):
+                contract, guards = self.action(action, node.span, first=state.first)
+                asked += guards
+                contracts += [contract] if contract is not None else []
+            found = self.waits(rest, contracts)
+            return _Asked(build.constant(True), tuple(asked), found, found) if asked else found
+
+        return self.with_drawn(state, values, node.span, taken)
+
+    def with_drawn(
+        self, state: _State, value: ModelValue, span: Span, following: Callable[[ModelValue], _Next]
+    ) -> _Next:
+        """Go on with a value whose random numbers are drawn."""
+        for leaf in self.values.drawn(value):
+            if isinstance(leaf, Index):
+                settled = [self.values.settled(value, leaf, option) for option in range(len(leaf.weights))]
+                return _Ways(tuple(self.with_drawn(state, each, span, following) for each in settled))
+            value = self.values.without(value, leaf, self.unknown(leaf, state, span, ()))
+        return following(value)
+
+    def action(self, value: ModelValue, span: Span, *, first: bool) -> tuple[Contract | None, _Guards]:
+        """The contract of an action, if it has one."""
         match value:
             case LibraryCall() if value.of.is_action:
-                self.actions.setdefault(value.of.name, span)
+                assert self.agent is not None
+                agent = self.agent
+                # where it is taken the next sample is the first that shows it: what it was given is past then
+                aged = self.values.aged(self.values.hold(value), "action", first=first)
+                call = cast(LibraryCall, aged.value)
+                contract, guards = self.excluding(
+                    lambda: action_contract(self.run, call.of.name, agent, call.positional, call.named, call.span)
+                )
+                if contract is None or contract.shows is None:
+                    self.actions.setdefault(call.of.name, call.span)
+                return contract, guards
             case Choice():
                 for option in value.options:
-                    self.action(option, span)
+                    self.action(option, span, first=first)
+                return None, ()
             case _:
                 raise fail("wrong-type", "this is no action", span, f"this is {describe(value)}")
 
@@ -726,21 +837,25 @@ class _Graph:
         """Do a behavior."""
         if not node.schedule and len(node.behaviors) > 1:
             raise fail("parse-error", "a behavior does one thing at a time", node.span, "several are done here")
-        found: list[ModelValue] = []
+        values: list[ModelValue] = []
         excluded: list[tuple[Node, Span]] = []
         for expression in node.behaviors:
             value, guards = self.evaluated(state, expression)
             excluded += guards
             if node.schedule and isinstance(value, dict) and len(node.behaviors) == 1:
                 weights = cast("dict[ModelValue, ModelValue]", value)
-                found += [behavior for behavior, weight in weights.items() if weight != 0]
+                values += [behavior for behavior, weight in weights.items() if weight != 0]
             else:
-                found.append(value)
-        held = tuple(self.values.hold(as_behavior(each, node.span)) for each in found)
-        inner: _Statement = _Begin(held[0], node.span) if not node.schedule else _Pick(
-            held, node.schedule == "shuffle", node.span
-        )  # fmt: skip
-        after = self.limited(state, rest, (inner,), node.until, node.duration, node.unit)
+                values.append(value)
+
+        def done(behaviors: ModelValue) -> _Next:
+            held = tuple(self.values.hold(as_behavior(each, node.span)) for each in behaviors)
+            inner: _Statement = _Begin(held[0], node.span) if not node.schedule else _Pick(
+                held, node.schedule == "shuffle", node.span
+            )  # fmt: skip
+            return self.limited(state, rest, (inner,), node.until, node.duration, node.unit)
+
+        after = self.with_drawn(state, values, node.span, done)
         return _Asked(build.constant(True), tuple(excluded), after, after) if excluded else after
 
     def limited(
@@ -758,7 +873,8 @@ class _Graph:
         after_s = self.seconds(self.run, duration, unit, self.scope(state, self.call_of(state)))
         if after_s <= 0:
             return checked
-        timer = next(number for number in range(LIMITS.process_steps) if number not in _timers(checked.frames))
+        used = _timers(checked.frames) | {timer for _, timer in state.modes}
+        timer = next(number for number in range(LIMITS.process_steps) if number not in used)
         frame = _Try((None,), ((),), body, timer, ends=True)
         found = replace(self.pushed(checked, frame), resumed=len(checked.frames), asked=0)
         return _Started(timer, after_s, found)
@@ -841,7 +957,7 @@ def _timers(frames: Sequence[_Frame]) -> set[int]:
 
 def process_of(
     run: Interpreter, call: ModelValue, number: int, agent: Instance | None, atom: Callable[[Node], Atom],
-    seconds: Seconds, actions: dict[str, Span], span: Span,
+    seconds: Seconds, actions: dict[str, Span], span: Span, reaction_s: float | None = None,
 ) -> tuple[Process, tuple[tuple[_Guards, Node, Span], ...]]:  # fmt: skip
     """A monitor or behavior as a graph, and what its first call asks for before anything happens.
 
@@ -854,13 +970,14 @@ def process_of(
         seconds: The time that an expression with a unit is.
         actions: Takes the names of actions that constrain nothing, each with its first place.
         span: Where the program requires it, or gives it to the object.
+        reaction_s: Seconds after which what it does must be shown; None where nothing must.
 
     Raises:
         ScenarioError: unsupported-construct, for a statement that is not followed; runtime-error for a loop that never
             waits; budget-exceeded; whatever is wrong with an expression.
     """
     values = LocalValues(number, Identity().order, run.lookups.ranks.values)
-    graph = _Graph(run, atom, agent, values, seconds, {}, span, actions)
+    graph = _Graph(run, atom, agent, values, seconds, {}, span, actions, reaction_s)
     asked: list[tuple[_Guards, Node, Span]] = []
     start = _State(())
     if isinstance(call, CoroutineCall):

@@ -12,7 +12,7 @@ from scenicq.compiler.exclusions import Exclusions
 from scenicq.compiler.process_graph import process_of
 from scenicq.compiler.step_times import simulation, step_seconds
 from scenicq.compiler.values import Instance, ModelValue, fail
-from scenicq.errors import Span
+from scenicq.errors import Diagnostic, Span
 from scenicq.forest.nodes import Constant, Feature, Node
 from scenicq.forest.temporal import (
     Always,
@@ -37,8 +37,10 @@ from scenicq.syntax.walk import walk
 if TYPE_CHECKING:
     from scenicq.compiler.interpreter import Interpreter
 
-__all__ = ["Behaviors", "Deferred", "TimedStatements", "is_temporal"]
+__all__ = ["REACTION_S", "Behaviors", "Deferred", "TimedStatements", "is_temporal"]
 
+REACTION_S = 1.0
+"""Seconds after which what an object does must be seen, unless it is said."""
 Behaviors = Literal["motion", "guards", "ignore"]
 """What becomes of behaviors: what they do must be seen, too; they run, and let every action pass; they are left out."""
 
@@ -73,11 +75,13 @@ class TimedStatements:
 
     Attributes:
         behaviors: What becomes of behaviors.
+        reaction_s: Seconds after which what an object does must be seen.
         used: Whether the program has any statement about time: it is a dynamic one.
         actions: The actions of behaviors that constrain nothing, each with its first place.
     """
 
     behaviors: Behaviors
+    reaction_s: float = REACTION_S
     used: bool = False
     _conditions: list[Callable[[], Node]] = field(default_factory=list[Callable[[], Node]])
     _requirements: list[TemporalRequirement] = field(default_factory=list[TemporalRequirement])
@@ -167,11 +171,15 @@ class TimedStatements:
         found: list[Process] = []
         calls = [(None, call, span) for call, span in self._monitors] + self._behaviors
         for number, (agent, call, span) in enumerate(calls):
-            process, asked = process_of(run, call, number, agent, atom, step_seconds, self.actions, span)
+            reaction_s = self.reaction_s if self.behaviors == "motion" else None
+            process, asked = process_of(run, call, number, agent, atom, step_seconds, self.actions, span, reaction_s)
             found.append(process)
             for guards, node, place in asked:
                 wanted = [*guards, (node, place)]
                 requirements += [TemporalRequirement(atom(each), where) for each, where in wanted]
+        for name, place in self.actions.items() if self.behaviors == "motion" else ():
+            message = f"what `{name}` does is not compared"
+            run.ignored.append(Diagnostic("unseen-action", message, place, severity="note"))
         return tuple(found)
 
     def _formula(self, deferred: Deferred, node: ast.Expression) -> Formula:

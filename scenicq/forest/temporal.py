@@ -177,11 +177,13 @@ class Arm:
         timer: Its number within the process.
         after_s: It is due at the first sample so many seconds later, and at least the next one.
         then: The step.
+        extends: Whether it goes on instead if it runs, and is due no sooner than it was.
     """
 
     timer: int
     after_s: float
     then: int
+    extends: bool = False
 
 
 @dataclass(frozen=True, slots=True)

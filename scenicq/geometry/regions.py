@@ -23,6 +23,7 @@ __all__ = [
     "SLACK",
     "XY",
     "Bounds",
+    "DeferredPolygons",
     "DeferredPolylines",
     "DifferenceOf",
     "Disc",
@@ -136,6 +137,23 @@ class PolygonSet(_Indexed):
 
     def _shapes(self) -> tuple[Shape, ...]:
         return self.polygons
+
+
+class DeferredPolygons(PolygonSet):
+    """The union of polygons that are worked out when somebody asks for them."""
+
+    def __init__(self, name: str, make: Callable[[], PolygonSet]) -> None:
+        """Take the name, and what makes the region."""
+        vars(self).update(name=name, orientation=None, ids=(), _make=make)
+
+    @cached_property
+    def _made(self) -> PolygonSet:
+        return vars(self)["_make"]()
+
+    @property
+    def polygons(self) -> tuple[Polygon | MultiPolygon, ...]:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """Valid polygons."""
+        return self._made.polygons
 
 
 @dataclass(frozen=True, eq=False)

@@ -323,7 +323,8 @@ class RunMachine:
                 case Goto():
                     at = step.then
                 case Arm():
-                    timers[step.timer] = here + 1 if later is None else later(step.after_s)
+                    due = here + 1 if later is None else later(step.after_s)
+                    timers[step.timer] = max(due, timers.get(step.timer, 0)) if step.extends else due
                     at = step.then
                 case Due():
                     at = step.then if timers[step.timer] <= here else step.otherwise
