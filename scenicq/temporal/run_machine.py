@@ -300,8 +300,9 @@ class RunMachine:
         over = over or any(map(holds, self._behind))
         # behaviors run one after the other, to the first one that ends the run or loses it
         for number in () if over else self._behaviors:
-            places[number], over = self._run(number, places[number], holds, chosen, here, later)
-            if places[number] == _REJECTED:
+            before = places[number]
+            places[number], over = self._run(number, before, holds, chosen, here, later)
+            if places[number] == _REJECTED != before:
                 places[number] = _REJECTS
             if over or places[number] == _REJECTS:
                 break
