@@ -6,7 +6,7 @@ kept: then it is unknown, and each variable has unknown values of its own.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import cast
 
@@ -17,7 +17,7 @@ from scenicq.compiler.values import Choice, Function, Instance, LabelObjects, Mo
 from scenicq.errors import Span
 from scenicq.forest.condition import condition as conditioned
 from scenicq.forest.kinds import kind_of
-from scenicq.forest.nodes import PAST, Constant, Feature, Index, Leaf, Node
+from scenicq.forest.nodes import PAST, Constant, Feature, Identity, Index, Leaf, Node
 from scenicq.forest.value_numbers import ValueNumbers
 from scenicq.forest.walk import is_leaf, leaves, postorder, transform
 
@@ -44,13 +44,14 @@ class LocalValues:
     Attributes:
         process: Its number.
         drawn_after: Random variables that are made later than this are drawn by the process.
-        ranks: But for these: which of several elements of the map that lie at a place is meant.
+        ranks: Which of several elements of the map that lie at a place is meant, by look-up and place: here the first
+            one, as in Scenic.
         numbers: Tells expressions apart.
     """
 
     process: int
     drawn_after: int
-    ranks: Callable[[], Iterable[Index]]
+    ranks: Mapping[tuple[object, ...], Index]
     numbers: ValueNumbers = field(default_factory=ValueNumbers)
     _keys: dict[int, tuple[object, Hashable]] = field(default_factory=dict["int", "tuple[object, Hashable]"])
     _aged: dict[tuple[int, str, bool], tuple[object, Held]] = field(
@@ -136,9 +137,21 @@ class LocalValues:
     def drawn(self, value: ModelValue) -> list[Leaf]:
         """The random variables that a value was made of that are not those of the scene."""
         found = leaves(*self.nodes(value))
-        made = [leaf for leaf in found if leaf.identity.order > self.drawn_after]
-        ranks = {rank.identity for rank in self.ranks()} if made else ()
-        return [leaf for leaf in made if leaf.identity not in ranks]
+        ranks = self._current_ranks() if found else ()
+        return [leaf for leaf in found if leaf.identity.order > self.drawn_after or leaf.identity in ranks]
+
+    def each(self, value: ModelValue, leaf: Index) -> list[ModelValue]:
+        """A value for each way in which a choice that is drawn may come out."""
+        count = 1 if leaf.identity in self._current_ranks() else len(leaf.weights)
+        return [self.settled(value, leaf, option) for option in range(count)]
+
+    def _current_ranks(self) -> set[Identity]:
+        """The ranks at places that are read at each sample."""
+        return {
+            rank.identity
+            for (_, where, *_), rank in self.ranks.items()
+            if rank.identity.order > self.drawn_after or (isinstance(where, tuple) and where[-1] is True)
+        }
 
     def without(self, value: ModelValue, leaf: Leaf, put: Node) -> ModelValue:
         """A value with an expression put for a random variable."""

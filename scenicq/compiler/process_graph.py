@@ -416,8 +416,8 @@ class _Graph:
             return then if node.value else otherwise
         for leaf in self.values.drawn(node):
             if isinstance(leaf, Index):
-                settled = [self.values.settled(node, leaf, option) for option in range(len(leaf.weights))]
-                return _Ways(tuple(self.test(state, each, guards, then, otherwise, span) for each in settled))
+                settled = [cast(Node, each) for each in self.values.each(node, leaf)]
+                return _any_of([self.test(state, each, guards, then, otherwise, span) for each in settled])
             node = cast(Node, self.values.without(node, leaf, self.unknown(leaf, state, span, ())))
         return _Asked(node, guards, then, otherwise)
 
@@ -456,11 +456,7 @@ class _Graph:
         """A state with variables of a call, whose random numbers are drawn."""
         for leaf in self.values.drawn(list(names.values())):
             if isinstance(leaf, Index):
-                ways: list[_Next] = []
-                for option in range(len(leaf.weights)):
-                    some = {name: self.values.settled(value, leaf, option) for name, value in names.items()}
-                    ways.append(self.drawn(state, number, some, span))
-                return _Ways(tuple(ways))
+                return _any_of([self.drawn(state, number, some, span) for some in self.values.each(names, leaf)])
             targets = tuple(name for name, value in names.items() if leaf in self.values.drawn(value))
             put = self.unknown(leaf, state, span, targets)
             names = {name: self.values.without(value, leaf, put) for name, value in names.items()}
@@ -806,8 +802,8 @@ class _Graph:
         """Go on with a value whose random numbers are drawn."""
         for leaf in self.values.drawn(value):
             if isinstance(leaf, Index):
-                settled = [self.values.settled(value, leaf, option) for option in range(len(leaf.weights))]
-                return _Ways(tuple(self.with_drawn(state, each, span, following) for each in settled))
+                settled = self.values.each(value, leaf)
+                return _any_of([self.with_drawn(state, each, span, following) for each in settled])
             value = self.values.without(value, leaf, self.unknown(leaf, state, span, ()))
         return following(value)
 
@@ -944,6 +940,11 @@ class _Graph:
         return found
 
 
+def _any_of(ways: Sequence[_Next]) -> _Next:
+    """Any of some ways."""
+    return ways[0] if len(ways) == 1 else _Ways(tuple(ways))
+
+
 def _timers(frames: Sequence[_Frame]) -> set[int]:
     """The timers that frames need."""
     found: set[int] = set()
@@ -976,7 +977,7 @@ def process_of(
         ScenarioError: unsupported-construct, for a statement that is not followed; runtime-error for a loop that never
             waits; budget-exceeded; whatever is wrong with an expression.
     """
-    values = LocalValues(number, Identity().order, run.lookups.ranks.values)
+    values = LocalValues(number, Identity().order, run.lookups.ranks)
     graph = _Graph(run, atom, agent, values, seconds, {}, span, actions, reaction_s)
     asked: list[tuple[_Guards, Node, Span]] = []
     start = _State(())
