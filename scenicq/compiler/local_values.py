@@ -119,8 +119,12 @@ class LocalValues:
             self._aged[asked] = held.value, self._made_old(held, place, first=first)
         return self._aged[asked][1]
 
+    def reads_samples(self, value: ModelValue) -> bool:
+        """Whether something of a value is read at each sample."""
+        return any(map(_is_current, postorder(self.nodes(value))))
+
     def _made_old(self, held: Held, place: str, *, first: bool) -> Held:
-        if not any(map(_is_current, postorder(self.nodes(held.value)))):
+        if not self.reads_samples(held.value):
             return held
 
         def step(node: Node) -> Node:

@@ -112,12 +112,26 @@ class _While:
     node: ast.While
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Items:
+    """What a loop goes through; there is one of each, so that it need not be compared.
+
+    Attributes:
+        held: It.
+        stays: Whether nothing of it is read at each sample.
+    """
+
+    held: tuple[Held, ...]
+    stays: bool
+
+
 @dataclass(frozen=True, slots=True)
 class _For:
-    """A loop with what it goes through yet."""
+    """A loop, with how many items it has been through."""
 
     node: ast.For
-    items: tuple[Held, ...]
+    items: _Items
+    done: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -284,6 +298,7 @@ class _Graph:
     _contracts: dict[Hashable, tuple[tuple[Contract, ...], _Guards]] = field(
         default_factory=dict["Hashable", "tuple[tuple[Contract, ...], _Guards]"]
     )
+    _items: dict[tuple[Held, ...], _Items] = field(default_factory=dict["tuple[Held, ...]", "_Items"])
     _numbers: dict[_State, int] = field(default_factory=dict["_State", int])
     _todo: list[tuple[int, _State]] = field(default_factory=list["tuple[int, _State]"])
 
@@ -500,12 +515,12 @@ class _Graph:
                 again = self.pushed(state, _Block(frame.node.body))
                 return self.ask(state, frame.node.test, again, self.pushed(below, _Block(frame.node.orelse)))
             case _For():
-                if not frame.items:
+                if frame.done == len(frame.items.held):
                     return self.pushed(below, _Block(frame.node.orelse))
-                rest = self.pushed(below, _For(frame.node, frame.items[1:]), _Block(frame.node.body))
+                rest = self.pushed(below, replace(frame, done=frame.done + 1), _Block(frame.node.body))
                 number = self.call_of(state)
                 names = self.scope(state, number)
-                assign(self.run, frame.node.target, frame.items[0].value, names)
+                assign(self.run, frame.node.target, frame.items.held[frame.done].value, names)
                 return self.with_names(rest, number, names, frame.node.span)
             case _Call():
                 return below
@@ -623,9 +638,9 @@ class _Graph:
                 case _Call():
                     names = tuple((name, old(held, name)) for name, held in frame.names)
                     found.append(replace(frame, names=names))
-                case _For():
-                    items = tuple(old(held, f"item {count}") for count, held in enumerate(frame.items))
-                    found.append(replace(frame, items=items))
+                case _For() if not frame.items.stays:
+                    items = tuple([old(held, f"item {count}") for count, held in enumerate(frame.items.held)])
+                    found.append(replace(frame, items=self.items(items)))
                 case _Library():
                     found.append(replace(frame, call=old(frame.call, "call")))
                 case _Block():
@@ -715,6 +730,8 @@ class _Graph:
                 return Terminate(node.span)
             case ast.DynamicStatement(kind="abort"):
                 return self.left(state, node.span, _Try)
+            case ast.Global() | ast.Nonlocal():
+                raise self.refused(node.span)
             case ast.TryInterrupt() if not (node.handlers or node.orelse or node.final):
                 interrupts = tuple(reversed(node.interrupts))
                 frame = _Try(
@@ -731,8 +748,8 @@ class _Graph:
                 return self.pushed(rest, _While(node))
             case ast.For():
                 value, guards = self.evaluated(state, node.iterable)
-                items = tuple(self.values.hold(each) for each in items_of(self.run, value, node.iterable.span))
-                found = self.pushed(rest, _For(node, items))
+                items = tuple([self.values.hold(each) for each in items_of(self.run, value, node.iterable.span)])
+                found = self.pushed(rest, _For(node, self.items(items)))
                 return _Asked(build.constant(True), guards, found, found) if guards else found
             case ast.Break():
                 frames = self.left(state, node.span, _While, _For).frames
@@ -744,6 +761,8 @@ class _Graph:
                 return replace(state, frames=state.frames[: self.call_of(state)])
             case ast.Assign() | ast.AugmentedAssign() | ast.AnnotatedAssign() | ast.ExpressionStatement():
                 return self.simple(state, node, rest)
+            case ast.TryInterrupt() | ast.Try() if node.handlers:
+                raise self.refused(node.handlers[0].span)
             case _:
                 raise self.refused(node.span)
 
@@ -751,9 +770,15 @@ class _Graph:
         """What is wrong with a statement that is not read."""
         word = span.text.split()[0].rstrip(":")
         if span.text.startswith("try"):
-            word = "except"
+            word = "finally"
         return fail("unsupported-construct", f"`{word}` in a {self.word} is not supported", span,
                     "is not followed over time")  # fmt: skip
+
+    def items(self, held: tuple[Held, ...]) -> _Items:
+        """What a loop goes through."""
+        if held not in self._items:
+            self._items[held] = _Items(held, not any(self.values.reads_samples(each.value) for each in held))
+        return self._items[held]
 
     def branch(self, state: _State, node: ast.If, number: int, rest: _State) -> _Next:
         """One branch after the other."""
