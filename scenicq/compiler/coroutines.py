@@ -1,7 +1,7 @@
 """What behaviors and monitors are before they run: definitions, and calls of these.
 
-A call makes something that runs over time: `require monitor` runs a monitor, `with behavior` and `do` a behavior. Of the
-behaviors and actions of Scenic's libraries the names are known.
+A call makes something that runs over time: `require monitor` runs a monitor, `with behavior` and `do` a behavior. The
+behaviors and actions of Scenic's libraries are known by their names.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Values of local variables in behaviors: when two are the same, and what is left of them at later samples.
 
-What a variable got from the first sample stays: it is read there, whatever the sample. What it got at a later one is not
-kept: then it is unknown, and each variable has unknown values of its own.
+What a variable got from the first sample stays: it is read there, whatever the sample. What it got at a later one is
+not kept: then it is unknown, and each variable has unknown values of its own.
 """
 
 from __future__ import annotations

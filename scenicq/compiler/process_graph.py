@@ -39,7 +39,7 @@ from scenicq.forest.temporal import (
     Goto,
     Process,
     Reject,
-    Step,
+    ProcessStep,
     Terminate,
     Test,
     Wait,
@@ -292,7 +292,7 @@ class _Graph:
     span: Span
     actions: dict[str, Span]
     reaction_s: float | None
-    steps: list[Step] = field(default_factory=list[Step])
+    steps: list[ProcessStep] = field(default_factory=list[ProcessStep])
     loose: set[int] = field(default_factory=set[int])
     _asked: dict[Hashable, tuple[Node, _Guards]] = field(default_factory=dict["Hashable", "tuple[Node, _Guards]"])
     _contracts: dict[Hashable, tuple[tuple[Contract, ...], _Guards]] = field(
@@ -320,7 +320,7 @@ class _Graph:
                 if isinstance(found, _Asked) and found.loose:
                     self.loose.add(number)
 
-    def add(self, step: Step) -> int:
+    def add(self, step: ProcessStep) -> int:
         """Add a step; its number."""
         if len(self.steps) > LIMITS.process_steps:
             raise fail("budget-exceeded", f"the {self.word} takes more than {LIMITS.process_steps:,} steps", self.span,
@@ -353,12 +353,12 @@ class _Graph:
         """The number of the step for what happens next."""
         return self.number(found) if isinstance(found, _State) else self.add(self.made(found))
 
-    def made(self, found: _Next) -> Step:
+    def made(self, found: _Next) -> ProcessStep:
         """The step for what happens next."""
         match found:
             case _Asked():
                 if isinstance(found.node, Constant):
-                    step: Step = Goto(self.placed(found.then if found.node.value else found.otherwise))
+                    step: ProcessStep = Goto(self.placed(found.then if found.node.value else found.otherwise))
                 else:
                     step = Test(self.atom(found.node), self.placed(found.then), self.placed(found.otherwise))
                 for guard, span in found.guards:
@@ -813,7 +813,7 @@ class _Graph:
             contracts: list[Contract] = []
             asked = list(excluded)
             for action in cast("list[ModelValue]", actions):
-                contract, guards = self.action(action, node.span, first=state.first)
+                contract, guards = self.action(action, node.span)
                 asked += guards
                 contracts += [contract] if contract is not None else []
             found = self.waits(rest, contracts)
@@ -832,24 +832,22 @@ class _Graph:
             value = self.values.without(value, leaf, self.unknown(leaf, state, span, ()))
         return following(value)
 
-    def action(self, value: ModelValue, span: Span, *, first: bool) -> tuple[Contract | None, _Guards]:
+    def action(self, value: ModelValue, span: Span) -> tuple[Contract | None, _Guards]:
         """The contract of an action, if it has one."""
         match value:
             case LibraryCall() if value.of.is_action:
                 assert self.agent is not None
                 agent = self.agent
-                # where it is taken the next sample is the first that shows it: what it was given is past then
-                aged = self.values.aged(self.values.hold(value), "action", first=first)
-                call = cast(LibraryCall, aged.value)
+                # who takes it again and again is given what each sample has
                 contract, guards = self.excluding(
-                    lambda: action_contract(self.run, call.of.name, agent, call.positional, call.named, call.span)
+                    lambda: action_contract(self.run, value.of.name, agent, value.positional, value.named, value.span)
                 )
                 if contract is None or contract.shows is None:
-                    self.actions.setdefault(call.of.name, call.span)
+                    self.actions.setdefault(value.of.name, value.span)
                 return contract, guards
             case Choice():
                 for option in value.options:
-                    self.action(option, span, first=first)
+                    self.action(option, span)
                 return None, ()
             case _:
                 raise fail("wrong-type", "this is no action", span, f"this is {describe(value)}")
@@ -1026,7 +1024,7 @@ def process_of(
     return Process(span, tuple(graph.steps), None if agent is None else agent.index), tuple(asked)
 
 
-def _spins(steps: Sequence[Step], loose: set[int]) -> bool:
+def _spins(steps: Sequence[ProcessStep], loose: set[int]) -> bool:
     """Whether some steps lead to each other without a `Wait`, but for some that may."""
     waiting = [0] * len(steps)
     after = [() if number in loose else successors(step) for number, step in enumerate(steps)]

@@ -29,7 +29,7 @@ __all__ = [
     "Or",
     "Process",
     "Reject",
-    "Step",
+    "ProcessStep",
     "TemporalRequirement",
     "Terminate",
     "Termination",
@@ -221,10 +221,10 @@ class End:
     """The process is over, and says nothing any more."""
 
 
-Step: TypeAlias = Test | Goto | Wait | Arm | Due | Choose | Terminate | Reject | End
+ProcessStep: TypeAlias = Test | Goto | Wait | Arm | Due | Choose | Terminate | Reject | End
 
 
-def successors(step: Step) -> tuple[int, ...]:
+def successors(step: ProcessStep) -> tuple[int, ...]:
     """The steps that may follow one within the same sample."""
     match step:
         case Test() | Due():
@@ -249,7 +249,7 @@ class Process:
     """
 
     span: Span
-    steps: tuple[Step, ...]
+    steps: tuple[ProcessStep, ...]
     object: int | None = None
 
     @property

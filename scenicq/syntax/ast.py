@@ -2,7 +2,7 @@
 
 Every node is a frozen value whose first field is the `Span` of the text it was read from. Parentheses leave no node.
 The unions at the end (`Expression`, `Specifier`, `Statement`) are closed, so that a `match` over one can end in
-`assert_never`. Of what is not read (scenarios, `record`, ...) only the place is kept.
+`assert_never`. What is not read (scenarios, `record`, ...) is kept as a place only.
 """
 
 from __future__ import annotations
@@ -675,7 +675,7 @@ class DynamicDefinition(SyntaxNode):
     """A definition of what happens over time; unnamed blocks have no name.
 
     Kinds: `behavior`, `monitor`, `scenario`, `setup`, `compose`, `precondition`, `invariant`. The span ends with the
-    header's colon. Of what is no behavior and no monitor only the place is kept.
+    header's colon. What is no behavior and no monitor is kept as a place only.
 
     Attributes:
         kind: Which.

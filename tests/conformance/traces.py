@@ -213,7 +213,9 @@ def parse_arguments() -> argparse.Namespace:
     parser.add_argument("--environment", type=Path, default=Path(".conformance-venv"), help="where Scenic is installed")
     parser.add_argument("--work", type=Path, default=Path(".conformance/traces"), help="folder of maps and recordings")
     parser.add_argument("--seeds", type=int, default=2, help="traces of each program")
-    parser.add_argument("--behaviors", choices=("ignore", "guards"), default="ignore", help="as of `scenicq match`")
+    parser.add_argument(
+        "--behaviors", choices=("ignore", "guards", "motion"), default="ignore", help="as of `scenicq match`"
+    )
     parser.add_argument("--formulas", type=int, default=10_000, help="random temporal formulas to compare with rv_ltl")
     parser.add_argument("--only", default="", metavar="PATTERN", help="programs in whose name this is found")
     return parser.parse_args()

@@ -37,7 +37,8 @@ STATEMENTS = {
     "record final (x)": "DynamicStatement(record final)",
     "do F() until x": "Do([F()], x)",
     "do F() for 3 * x seconds": "Do([F()], (* 3 x), seconds)",
-    "try:\n  wait\ninterrupt when x:\n  wait\ninterrupt when y:\n  abort": "TryInterrupt([DynamicStatement(wait)], [Interrupt(x, [DynamicStatement(wait)]), Interrupt(y, [DynamicStatement(abort)])])",
+    "try:\n  wait\ninterrupt when x:\n  wait\ninterrupt when y:\n  abort": "TryInterrupt("
+    "[DynamicStatement(wait)], [Interrupt(x, [DynamicStatement(wait)]), Interrupt(y, [DynamicStatement(abort)])])",
     "do choose {A(): 1, B(): 2}": "Do([Dict([DictItem(A(), 1), DictItem(B(), 2)])], choose)",
     "do shuffle A(), B()": "Do([A(), B()], shuffle)",
     "take A(), B()": "Take([A(), B()])",
@@ -48,7 +49,8 @@ STATEMENTS = {
     "abort": "DynamicStatement(abort)",
     "invoke A()": "Do([A()])",
     "override ego with behavior B(),\n  with x 1": "DynamicStatement(override)",
-    "try:\n  do A()\ninterrupt when x:\n  do B()\nexcept E:\n  abort": "TryInterrupt([Do([A()])], [Interrupt(x, [Do([B()])])], [ExceptHandler(E, [DynamicStatement(abort)])])",
+    "try:\n  do A()\ninterrupt when x:\n  do B()\nexcept E:\n  abort": "TryInterrupt([Do([A()])], "
+    "[Interrupt(x, [Do([B()])])], [ExceptHandler(E, [DynamicStatement(abort)])])",
 }
 
 

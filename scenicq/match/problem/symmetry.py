@@ -34,7 +34,7 @@ from scenicq.forest.temporal import (
     Formula,
     Or,
     Reject,
-    Step,
+    ProcessStep,
     Terminate,
     Test,
     operands,
@@ -274,7 +274,7 @@ class _Forms(ValueNumbers):
         return numbers[id(root)]
 
 
-def _step(step: Step, atoms: Sequence[int]) -> Hashable:
+def _step(step: ProcessStep, atoms: Sequence[int]) -> Hashable:
     match step:
         case Test():
             return "test", atoms[step.condition.number], step.then, step.otherwise
