@@ -23,7 +23,7 @@ from __future__ import annotations
 import inspect
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, cast
 
 from scenicq.compiler import operators
@@ -50,7 +50,7 @@ from scenicq.forest.nodes import (
     Undefined,
 )
 from scenicq.geometry.elements import Lane, LaneSection, NetworkElement
-from scenicq.geometry.regions import Nowhere, PointSet, PolygonSet, PolylineSet, Region
+from scenicq.geometry.regions import Everywhere, Nowhere, PointSet, PolygonSet, PolylineSet, Region
 
 if TYPE_CHECKING:
     from scenicq.compiler.interpreter import Interpreter
@@ -70,9 +70,8 @@ class Contract:
         least_steps: Samples that it lasts at least: 1 where an action is taken before it is over.
         remains: Whether what it shows goes on after it is over, until the object does something else, as who is sent
             walks on.
-        entered: Whole numbers read at the sample of entry: the lanes that hold the object, and some of them again.
-        shows_from: Gives what must be shown besides by who entered with these numbers; None where nothing hangs on it.
-            Where they are not observed, it is unknown.
+        shows_from: Gives what must be shown besides by who entered the mode at a place, an expression: where it was as
+            observed, or a feature that is not observed; None where nothing hangs on it.
     """
 
     name: str
@@ -81,8 +80,7 @@ class Contract:
     over: Node | None = field(default=None, kw_only=True)
     least_steps: int = field(default=0, kw_only=True)
     remains: bool = field(default=False, kw_only=True)
-    entered: tuple[Node, ...] = field(default=(), kw_only=True)
-    shows_from: Callable[[tuple[int, ...]], Node] | None = field(default=None, kw_only=True)
+    shows_from: Callable[[Node], Node] | None = field(default=None, kw_only=True)
 
 
 def action_contract(
@@ -181,12 +179,14 @@ class _Motion:
         name: The action or behavior in question.
         agent: The object.
         span: Where the program names it.
+        distances: How far it is from regions that have been asked about, each asked about once.
     """
 
     run: Interpreter
     name: str
     agent: Instance
     span: Span
+    distances: dict[int, tuple[Node, Node]] = field(default_factory=dict[int, "tuple[Node, Node]"])
 
     def observed(self, name: str) -> Node:
         """A property of the object."""
@@ -298,9 +298,14 @@ class _Motion:
 
     def within(self, region: Region | Node, distance: float) -> Node:
         """The centre lies so many metres from a region at most."""
-        area = region if is_node(region) else build.constant(cast(Region, region))
-        away = fold(Distance(cast(Node, area), self.place, span=self.span))
-        return self.compare(CompareOp.LE, away, distance)
+        return self.compare(CompareOp.LE, self.away(region), distance)
+
+    def away(self, region: Region | Node) -> Node:
+        """How far the centre is from a region."""
+        if id(region) not in self.distances:
+            area = cast(Node, region) if is_node(region) else build.constant(cast(Region, region))
+            self.distances[id(region)] = area, fold(Distance(area, self.place, span=self.span))
+        return self.distances[id(region)][1]
 
     def near_junction(self, distance: float) -> Node | None:
         """The centre is in a junction, or so many metres before one; None where the map has none."""
@@ -331,20 +336,6 @@ class _Motion:
             along = build.add(along, build.constant(math.pi), self.span)
         heads = self.turned_from(along, to_heading(self.agent, self.span))
         return _either(heads, self.near_junction(0.0))
-
-    def lanes_here(self) -> tuple[Node, ...]:
-        """The numbers of the lanes that hold the object."""
-        lookups, network = self.run.lookups, self.run.network
-        family, layers = LOOKUPS["laneAt"]
-        table = lookups.table((id(network), "laneAt"), "network.laneAt", family, lambda: layers(network))
-        return lookups.numbers(table, self.place, self.span) if table.options else ()
-
-    def lanes_of(self, numbers: Sequence[int]) -> tuple[Lane, ...]:
-        """The lanes that have these numbers."""
-        table = self.run.lookups.tables[id(self.run.network), "laneAt"]
-        return tuple(
-            cast(Lane, table.options[each]) for each in dict.fromkeys(numbers) if 0 <= each < len(table.options)
-        )
 
     def in_course_of(self, lane: ModelValue, name: str, *, against: bool = False) -> Node:
         """The centre is in a lane or where it leads to."""
@@ -588,19 +579,30 @@ def _follow_lane(
     over = None if against else _leads_nowhere(motion)
     if laneToFollow is not None:
         kept = motion.in_course_of(laneToFollow, "laneToFollow", against=against)
-        return Contract(motion.name, _both(shows, kept), over=over)
+        return Contract(motion.name, _both(shows, kept), settles_s=_bound("lane window"), over=over)
     on_lanes = motion.within(motion.run.network.drivableRegion, _bound("lane"))
-    keeps = _keeps_lane(motion, against=against)
-    return Contract(motion.name, _both(shows, on_lanes), over=over, entered=motion.lanes_here(), shows_from=keeps)
+    return Contract(
+        motion.name, _both(shows, on_lanes), settles_s=_bound("lane window"), over=over,
+        shows_from=_keeps_lane(motion, against=against),
+    )  # fmt: skip
 
 
-def _keeps_lane(motion: _Motion, *others: PolygonSet, against: bool = False) -> Callable[[tuple[int, ...]], Node]:
-    """The centre is where one of the lanes entered on leads to; who entered on none may be on any."""
+def _keeps_lane(motion: _Motion, *, against: bool = False) -> Callable[[Node], Node]:
+    """The centre is where one of the lanes entered on leads to; who entered on none may be anywhere."""
+    lookups, network = motion.run.lookups, motion.run.network
+    family, layers = LOOKUPS["laneAt"]
+    table = lookups.table((id(network), "laneAt"), "network.laneAt", family, lambda: layers(network))
+    lanes = (cast(Lane, each) for each in table.options)
+    courses = [lane_course(motion.run, each, motion.span, against=against) for each in lanes]
+    options = tuple(build.constant(each) for each in (*courses, Everywhere()))
 
-    def keeps(numbers: tuple[int, ...]) -> Node:
+    def keeps(place: Node) -> Node:
+        numbers = lookups.numbers(table, place, motion.span) if table.options else ()
+        areas = (fold(Select(number, options, span=motion.span)) for number in numbers)
         with read_over_time():
-            areas = [lane_course(motion.run, each, motion.span, against=against) for each in motion.lanes_of(numbers)]
-            return _either(*(motion.within(each, _bound("lane")) for each in areas)) if areas else build.constant(True)
+            return (
+                _either(*(motion.within(each, _bound("lane")) for each in areas)) if numbers else build.constant(True)
+            )
 
     return keeps
 
@@ -628,13 +630,9 @@ def _follow_trajectory(
         motion.heads_along_road(),
         motion.approaches(target, motion.near_junction(_bound("lane")), turn),
     )
-    over = _closer(motion, motion.behind(lanes[-1], "trajectory"), _bound("trajectory end"))
-    return Contract(motion.name, shows, over=over)
-
-
-def _closer(motion: _Motion, region: Node, distance: float) -> Node:
-    away = fold(Distance(region, motion.place, span=motion.span))
-    return motion.compare(CompareOp.LT, away, distance)
+    end = motion.away(motion.behind(lanes[-1], "trajectory"))
+    over = motion.compare(CompareOp.LT, end, _bound("trajectory end"))
+    return Contract(motion.name, shows, settles_s=_bound("lane window"), over=over)
 
 
 def _turn(motion: _Motion, trajectory: ModelValue, target_speed: ModelValue = 6) -> Contract:
@@ -673,8 +671,8 @@ def _change_lane(
     )
     middle = motion.within(motion.each(laneSectionToSwitch, line), _bound("arrived"))
     return Contract(
-        motion.name, shows, over=middle, entered=motion.lanes_here(),
-        shows_from=lambda numbers: _either(new, from_old(numbers)),
+        motion.name, shows, over=middle,
+        shows_from=lambda place: _either(new, from_old(place)),
     )  # fmt: skip
 
 
@@ -691,10 +689,7 @@ def _drive_avoiding_collisions(
         for each in others
     ]
     avoids = _both(_either(*near), motion.brakes()) if near else None
-    return Contract(
-        motion.name, _either(follows.shows, avoids), over=follows.over, entered=follows.entered,
-        shows_from=follows.shows_from,
-    )  # fmt: skip
+    return replace(follows, shows=_either(follows.shows, avoids))
 
 
 def _crossing(

@@ -33,6 +33,7 @@ from scenicq.compiler.imports import Modules
 from scenicq.compiler.interpreter import Interpreter
 from scenicq.compiler.temporal import TimedStatements
 from scenicq.errors import Source, Span
+from scenicq.forest import build
 from scenicq.forest.nodes import Compare, Constant, Logic, LogicOp, Node
 from scenicq.forest.show import show
 from scenicq.forest.walk import postorder
@@ -93,7 +94,7 @@ CASES: Mapping[str, Case] = {
     ),
     "follows, fast": Case(
         "FollowLaneBehavior", "[{speed}]", "",
-        "ego = new Car with speed {speed} + 4, with behavior FollowLaneBehavior({speed})",
+        "ego = new Car with speed {speed} + 2.5, with behavior FollowLaneBehavior({speed})",
     ),
     "follows a given lane": Case(
         "FollowLaneBehavior", "[{speed}, start]", STRAIGHT,
@@ -269,16 +270,14 @@ def contract_of(case: Case, names: Mapping[str, int], network: Network, objects:
     return made[case.phase] if isinstance(made, tuple) else made
 
 
-def truths(columns: AtomColumns, contract: Contract, entry: int) -> NDArray[np.int8]:
+def truths(columns: AtomColumns, contract: Contract, entry: int, agent: int = 0) -> NDArray[np.int8]:
     """Whether a contract is shown at each sample, for a mode that is entered at one."""
     shown = np.full(len(columns.samples), TRUE) if contract.shows is None else columns.truth_of(contract.shows)
     if contract.shows_from is None:
         return shown
-    numbers = [columns.number(each) for each in contract.entered]
-    read = [float(each[entry]) for each in numbers if each is not None]
-    if len(read) < len(numbers) or np.isnan(read).any():
-        return np.minimum(shown, UNKNOWN)
-    return np.minimum(shown, columns.truth_of(contract.shows_from(tuple(map(round, read)))))
+    x, y = (float(each[entry]) for each in columns.samples.observed(agent, "position") or ())
+    kept = contract.shows_from(build.constant((x, y)))
+    return np.minimum(shown, columns.truth_of(kept))
 
 
 def missed(
@@ -384,6 +383,68 @@ def measure(
         into.numbers[name].append(numbers[mine])
 
 
+DRIVES = {"Car", "Truck", "Bus", "Van", "Vehicle", "Motorcycle"}
+LONG_S = 4.0
+"""How long a track must be to be looked at."""
+
+
+def driven(dataset: Path) -> dict[str, Measured]:
+    """What the tracks of vehicles in a dataset show.
+
+    A track that drives is asked whether it keeps its lane at its own median speed; one that comes to a stop, whether it
+    brakes from its last peak on; each that drives, how it would pass for another speed, and for one that brakes.
+    """
+    opened = open_dataset(dataset)
+    found: dict[str, Measured] = defaultdict(Measured)
+    charts: dict[str, str] = {}
+    vehicles: dict[str, dict[tuple[str, str], None]] = defaultdict(lambda: {("ego", ""): None})
+    for label in opened.labels():
+        charts[label.recording] = label.map
+        vehicles[label.recording] |= {
+            ("track", each.track): None for each in label.objects if each.track and each.category in DRIVES
+        }
+    for recording in recordings_of(dataset):
+        network = opened.network(charts[recording.name])
+        run, _, span = interpreter_of(f"{MODEL}ego = new Car\n", network)
+        ego = run.objects[0]
+        for key in vehicles[recording.name]:
+            x = recording.column(key, "x")
+            seen = np.flatnonzero(~np.isnan(x))
+            times = recording.seconds[seen[0] : seen[-1] + 1]
+            if times[-1] - times[0] < LONG_S:
+                continue
+            columns = AtomColumns(None, Samples(recording, {0: key}, int(seen[0]), int(seen[-1]) + 1))  # type: ignore[arg-type]
+            (speed,) = columns.samples.observed(0, "speed") or ()
+            (acceleration,) = columns.samples.observed(0, "acceleration") or ()
+            middle = float(np.nanmedian(speed)) if np.isfinite(speed).any() else 0.0
+            if middle < 0.2:
+                found["rests"].numbers["acceleration at rest"].append(acceleration)
+                found["rests"].numbers["speed at rest"].append(speed)
+            if middle < 3.0:
+                continue
+            for name, target in (("keeps its lane and speed", middle), ("would pass for half as fast", middle / 2),
+                                 ("would pass for twice as fast", middle * 2)):  # fmt: skip
+                made = behavior_contract(run, "FollowLaneBehavior", ego, (target,), {}, span)
+                assert made is not None
+                measure(found[name], columns, made[0], times, 0.0, str(key))
+            assert made is not None
+            assert made[0].shows_from is not None
+            place = build.constant((float(x[seen[0]]), float(recording.column(key, "y")[seen[0]])))
+            kept = made[0].shows_from(place)
+            for _, numbers in compared(columns, kept):
+                found["keeps its lane and speed"].numbers["metres beside its course"].append(numbers)
+            brakes = action_contract(run, "SetBrakeAction", ego, (1,), {}, span)
+            assert brakes is not None
+            measure(found["would pass for braking"], columns, brakes, times, 0.0, str(key))
+            rest = np.flatnonzero(speed < 0.5)
+            if len(rest) and rest[0] > 10 and np.nanmax(speed[: rest[0]]) > 4.0:
+                peak = float(times[int(np.nanargmax(speed[: rest[0]]))])
+                last = int(rest[0]) + 1
+                stop = Samples(recording, {0: key}, int(seen[0]), int(seen[0]) + last)
+                measure(found["comes to a stop"], AtomColumns(None, stop), brakes, times[:last], peak, str(key))  # type: ignore[arg-type]
+    return found
+
+
 def print_quantiles(measured: Measured) -> None:
     """The quantiles of what is compared."""
     for name, parts in measured.numbers.items():
@@ -401,6 +462,7 @@ def parse_arguments() -> argparse.Namespace:
     """The command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--map", type=Path, action="append", default=[], help="an OpenDRIVE map")
+    parser.add_argument("--data", type=Path, action="append", default=[], help="a dataset whose tracks are looked at")
     parser.add_argument("--environment", type=Path, default=Path(".conformance-venv"), help="where Scenic is installed")
     parser.add_argument("--work", type=Path, default=Path(".conformance/contracts"), help="folder of maps and traces")
     parser.add_argument("--seeds", type=int, default=5, help="traces of each case on each map")
@@ -432,6 +494,11 @@ def main() -> int:
                     print_quantiles(found["10 Hz"])
         finally:
             original.close()
+    for dataset in arguments.data:
+        for name, each in driven(dataset).items():
+            print(f"{dataset.name + ': ' + name:<40}{each.line()}", flush=True)
+            if arguments.quantiles:
+                print_quantiles(each)
     return 0 if good else 1
 
 
