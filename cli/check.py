@@ -144,7 +144,7 @@ def _found(
                 network,
                 version=version,
                 initial=initial,
-                behaviors="ignore",
+                behaviors="motion",
                 loader=loader,
                 model=asked.model,
                 map_defaults=asked.map_defaults,

@@ -15,6 +15,7 @@ from typing import Any
 
 import click
 
+from scenicq.compiler.temporal import REACTION_S
 from scenicq.errors import Diagnostic
 from scenicq.exporters.forms import FORMS
 from scenicq.match.verdict import Match, Unknown
@@ -150,8 +151,11 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @click.option("--scenic", type=option_type("scenic"), help="Version of Scenic.  [default: inferred]")
 @MAP_DEFAULTS
 @click.option("--initial", is_flag=True, help="Ignore behaviors and other dynamic parts: match the initial scene.")
-@click.option("--behaviors", type=click.Choice(["ignore"]), help="ignore leaves behaviors out and matches the rest of "
-              "a dynamic program over time.")
+@click.option("--behaviors", type=option_type("behaviors"), default="motion", help="What becomes of behaviors: "
+              "motion runs them and compares what they do with what is seen; guards lets every action pass; ignore "
+              "leaves them out.")
+@click.option("--reaction", metavar="S", type=option_type("reaction"), default=REACTION_S,
+              help="Seconds that an object has to do what its behavior says, at each change.")
 @click.option("--min-duration", metavar="S", type=option_type("min_duration"), help="Find intervals of at least S "
               "seconds: of a program about one instant, those in which every frame matches with the same objects.")
 @click.option("--intervals", type=option_type("intervals"), default="longest",

@@ -20,14 +20,14 @@ DEFAULTS = MatchOptions()
 """What counts as a match unless options say otherwise."""
 SHARED = frozenset({
     "tolerance", "classes", "ego", "radius", "enforce", "exact", "solver", "method", "timeout", "budget", "scenic",
-    "initial", "map_defaults", "behaviors", "ignore_params", "strict",
+    "initial", "map_defaults", "behaviors", "reaction", "ignore_params", "strict",
 })  # fmt: skip
 """Options of `match` that say what a match is; the others say which frames and what to show of them."""
 OVER_TIME = frozenset({"min_duration", "gap"})
 """Options of `match` that say what an interval is."""
 TOPICS = {
-    "What counts as a match": SHARED - {"solver", "method", "timeout", "budget", "strict", "behaviors"},
-    "Over time": {"behaviors", "min_duration", "intervals", "gap"},
+    "What counts as a match": SHARED - {"solver", "method", "timeout", "budget", "strict", "behaviors", "reaction"},
+    "Over time": {"behaviors", "reaction", "min_duration", "intervals", "gap"},
     "How it is decided": {"solver", "method", "timeout", "budget", "prefilter", "jobs", "engine"},
     "What comes out": {
         "limit", "every", "all_matches", "near", "rank", "sample", "diverse", "advised",

@@ -100,6 +100,7 @@ CODES: dict[str, str] = {
     "solver-failed": "the solver cannot be started",
     # the answers
     "frame-excluded": "what a frame shows is not what the program allows",
+    "unseen-action": "an action or behavior of which no recording shows anything",
     "never-compared": "the program sets what no label of the dataset has",
     "class-absent": "the program has a role for a class that no label object of the dataset has",
     "no-tracks": "a program over time, and objects of which nothing says that they are the same in several labels",

@@ -102,7 +102,7 @@ class Limits:
     region_parts: int = _refused(5_000, "parts", "of a region that is combined from others")
     random_way_steps: int = _refused(100, "steps", "along a field over a random distance")
     known_way_steps: int = _refused(2_000, "steps", "along a field over a known distance")
-    monitor_steps: int = _refused(1_000, "steps", "of a monitor: each takes time at each sample")
+    process_steps: int = _refused(4_000, "steps", "of a monitor or behavior, of all that it can be in")
     rounded_nodes: int = _otherwise(
         16, "nodes", "of a number to be rounded that are looked at for a half that may be hit", "the general formula"
     )

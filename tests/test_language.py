@@ -69,7 +69,7 @@ class Block:
     def compiled(self) -> Scenario:
         """The scenario over the made-up street."""
         source = Source(f"{self.page}:{self.line}", self.text)
-        initial, behaviors = "initial" in self.options, "ignore" if "ignore" in self.options else "refuse"
+        initial, behaviors = "initial" in self.options, "ignore" if "ignore" in self.options else "guards"
         return compile_scenario(source, street(), version=self.version, initial=initial, behaviors=behaviors)
 
 

@@ -140,7 +140,7 @@ class Lookups:
         """Start with none."""
         self.tables: dict[object, LookupTable] = {}
         self.indices: dict[tuple[object, object], Node] = {}
-        self.ranks: dict[tuple[str, object], Index] = {}
+        self.ranks: dict[tuple[object, ...], Index] = {}
         self.known: dict[tuple[int, str], Constant | None] = {}
         self.courses: dict[tuple[Lane, bool], PolygonSet] = {}
         self._kept: list[Node] = []
@@ -153,7 +153,7 @@ class Lookups:
 
     def index(self, key: object, table: LookupTable, place: Node, span: Span) -> Node:
         """Which option lies at a random place."""
-        where = (place.object, place.property) if isinstance(place, Feature) else id(place)
+        where = (place.object, place.property, place.current) if isinstance(place, Feature) else id(place)
         if (key, where) not in self.indices:
             self._kept.append(place)
             self.indices[key, where] = self._make_index(table, place, where, span)
@@ -177,5 +177,6 @@ class Lookups:
         rank = self.ranks.setdefault((table.family, where), Index((1.0,) * depth, span=span))
         if len(rank.weights) < depth:
             # more overlap here than the ranks of the family tell apart
-            rank = Index((1.0,) * depth, span=span)
+            wide = (table.family, where, depth)
+            rank = self.ranks.setdefault(wide, Index((1.0,) * depth, span=span))
         return Select(rank, self.numbers(table, place, span, len(rank.weights)), span=span)

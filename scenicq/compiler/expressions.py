@@ -14,6 +14,7 @@ from scenicq.compiler.arithmetic import hashed, plain_unary
 from scenicq.compiler.assignment import assign_around, go_through, through_others
 from scenicq.compiler.attributes import attribute
 from scenicq.compiler.comparisons import binary, compare, iterate, symbolic
+from scenicq.compiler.coroutines import LibraryCall, LibraryName
 from scenicq.compiler.courses import option_of
 from scenicq.compiler.distributions import interval
 from scenicq.compiler.environment import FIRST_NAMES, Environment
@@ -108,6 +109,8 @@ def call(
         return each_existing(run, function, lambda option: call(run, option, args, named, span), span)
     if isinstance(function, Module) and function.call is not None:
         return call(run, function.call, args, named, span)
+    if isinstance(function, LibraryName):
+        return LibraryCall(function, tuple(args), dict(named), span)
     if isinstance(function, ScenicClass):
         spelled = f"new {function.name} at (1, 2)" if run.version == 3 else f"{function.name} at 1 @ 2"
         raise fail("wrong-type", f"`{function.name}` is a class of objects, not a function", span, "called here",
@@ -227,6 +230,8 @@ def _evaluate(run: Interpreter, node: ast.Expression, scope: Environment) -> Mod
                 return run.ego(span)
             if node.id == "globalParameters" and scope.find(node.id) is None:
                 return Module("globalParameters", {name: given[0] for name, given in run.params.items()})
+            if node.id == "simulation" and run.simulation is not None and scope.find(node.id) is None:
+                return run.simulation
             return read(run, scope.get(node.id, span))
         case ast.LiteralValue():
             if isinstance(node.value, complex | bytes | type(...)):

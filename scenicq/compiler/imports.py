@@ -7,6 +7,8 @@ go up from the package of the file that has them, and a module that is still bei
 from __future__ import annotations
 
 from scenicq.compiler.builtins import language_names
+from scenicq.compiler.contracts import ACTIONS, BEHAVIORS
+from scenicq.compiler.coroutines import LibraryName
 from scenicq.compiler.environment import FIRST_LIBRARIES, Environment
 from scenicq.compiler.imported_files import ImportedFiles, Loader, absolute, packages
 from scenicq.compiler.interpreter import Interpreter
@@ -25,8 +27,9 @@ from scenicq.compiler.operations import operator_functions
 from scenicq.compiler.roots import root_classes
 from scenicq.compiler.sequences import sequence_functions
 from scenicq.compiler.unread import NoValue
-from scenicq.compiler.values import Builtin, ModelValue, Module, fail
+from scenicq.compiler.values import Builtin, Instance, ModelValue, Module, fail
 from scenicq.errors import Diagnostic, Note, ScenarioError, Span, similar
+from scenicq.forest.nodes import PAST, Feature, Node
 from scenicq.geometry.network import Network
 from scenicq.syntax import ast
 
@@ -132,9 +135,15 @@ class Modules:
             if alias.path == "*":
                 scope.names.update(_public(module))
             elif module.dynamic:
-                scope.set(alias.name or alias.path, None)
+                scope.set(alias.name or alias.path, self._library_name(alias.path))
             else:
                 scope.set(alias.name or alias.path, self._member(module, alias))
+
+    def _library_name(self, name: str) -> ModelValue:
+        """What a name of a module of behaviors and actions stands for, where behaviors are followed; else nothing."""
+        timed = self.interpreter.timed
+        followed = timed is not None and timed.behaviors != "ignore"
+        return LibraryName(name, name not in BEHAVIORS) if followed else None
 
     def _member(self, module: Module, alias: ast.ImportAlias) -> ModelValue:
         """What `from module import member` gives: a name of the module, else a module in its package."""
@@ -161,11 +170,13 @@ class Modules:
         files = libraries_of(name)
         if not files:
             return None
-        records = {"_record": Builtin("_record", _record), "_module": Builtin("_module", _module)}
+        records = {"_record": Builtin("_record", _record), "_module": Builtin("_module", _module),
+                   "_unknown": Builtin("_unknown", _unknown)}  # fmt: skip
         scope = Environment(network_names(self._network, files[-1]) | records, self.base, library=True)
         for file in files:
             self.interpreter.run(library_text(file, map_defaults=self._map_defaults).body, scope)
-        return Module(name, {key: value for key, value in scope.names.items() if not key.startswith("_")})
+        names = {name: self._library_name(name) for name in ACTIONS | BEHAVIORS}
+        return Module(name, names | {key: value for key, value in scope.names.items() if not key.startswith("_")})
 
     def _package(self, name: str) -> Module | None:
         """A package without an `__init__`, which has no names but those of its modules."""
@@ -194,6 +205,13 @@ class Modules:
 def _public(module: Module) -> dict[str, ModelValue]:
     """The names that `from module import *` takes."""
     return {name: value for name, value in module.names.items() if not name.startswith("_")}
+
+
+def _unknown(span: Span, what: str, owner: ModelValue = None, *more: ModelValue) -> Node:
+    """Something that no label says, one for all its arguments."""
+    index = owner.index if isinstance(owner, Instance) and owner.index is not None else 0
+    words = " ".join(str(each) if isinstance(each, int | float | str) else str(id(each)) for each in (what, *more))
+    return Feature(index, f"{PAST}{words}", "other", current=True, span=span)
 
 
 def _record(_: Span, name: str, width: float, length: float) -> Module:

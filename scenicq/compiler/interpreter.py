@@ -14,6 +14,7 @@ from scenicq.compiler.assignment import assign
 from scenicq.compiler.classes import bind_arguments, define_class, refuse_decorators
 from scenicq.compiler.coerce import to_region, to_scalar
 from scenicq.compiler.comparisons import binary, iterate
+from scenicq.compiler.coroutines import CoroutineCall, CoroutineDefinition
 from scenicq.compiler.courses import Course
 from scenicq.compiler.deviations import deviation, leaves_the_plane
 from scenicq.compiler.element_lookups import Lookups
@@ -23,7 +24,6 @@ from scenicq.compiler.expressions import evaluate
 from scenicq.compiler.items import items_of
 from scenicq.compiler.known_properties import known_truth
 from scenicq.compiler.logic import condition
-from scenicq.compiler.monitors import MonitorCall, MonitorDefinition
 from scenicq.compiler.recorded_values import RecordStatement, record_statement
 from scenicq.compiler.requirements import RequireStatement, requirement
 from scenicq.compiler.scoping import own_names
@@ -90,6 +90,7 @@ class Interpreter:
         excluded: Outcomes of random choices that no scene has.
         lookups: What the program asks about places of the map.
         timed: Takes what is said about time; None for a program that is matched at one instant.
+        simulation: What `simulation()` gives; None before the program has run.
         course: Decides the tests of a condition on the scene while one is evaluated: there, no value of an object is
             known before a label tells it. None while the program itself runs.
     """
@@ -109,6 +110,7 @@ class Interpreter:
     timed: TimedStatements | None = None
     ignored: list[Diagnostic] = field(default_factory=list[Diagnostic])
     current_ego: Instance | None = None
+    simulation: ModelValue = None
     course: Course | None = None
     workspace: Node = field(default_factory=lambda: build.constant(Everywhere()))
     _bound: dict[int, tuple[object, frozenset[str]]] = field(default_factory=dict[int, Any])
@@ -161,8 +163,8 @@ class Interpreter:
     ) -> ModelValue:
         """Call a function."""
         given = bind_arguments(function, args, named, span)
-        if isinstance(function, MonitorDefinition):
-            return MonitorCall(function, given)
+        if isinstance(function, CoroutineDefinition):
+            return CoroutineCall(function, given, span)
         scope = Environment(given, cast(Environment, function.environment), own=self._own_names(function))
         self.budget.enter(span)
         try:
@@ -221,7 +223,9 @@ class Interpreter:
             self._may_lack,
             is_object=is_object,
         )
-        kept = [node for node in specifiers if not self._is_dynamic(node)]
+        dynamic = [each for each in specifiers if isinstance(each, ast.WithSpecifier) and each.property == "behavior"]
+        behaviors = [(self._behavior(each, scope), each.span) for each in dynamic]
+        kept = [each for each in specifiers if each not in dynamic]
         bound = tuple(bind(node, lambda part: evaluate(self, part, scope), around) for node in kept)
         if scope.library:
             bound = tuple(replace(specifier, explicit=False) for specifier in bound)
@@ -231,6 +235,11 @@ class Interpreter:
         if is_object:
             self.objects.append(instance)
         construct(instance, bound, self)
+        if self.timed is not None and self.timed.behaviors != "ignore" and is_object:
+            if not behaviors and "behavior" in instance.properties:
+                behaviors = [(instance.properties.pop("behavior"), span)]
+            for behavior, place in behaviors:
+                self.timed.behave(instance, behavior, place)
         return instance
 
     def _may_lack(self, index: Node) -> bool:
@@ -246,11 +255,12 @@ class Interpreter:
                     todo += [cast(Node, value)] if is_node(value) else []
         return False
 
-    def _is_dynamic(self, node: ast.Specifier) -> bool:
-        if not (isinstance(node, ast.WithSpecifier) and node.property == "behavior"):
-            return False
-        self.dynamic("with behavior", node.span)
-        return True
+    def _behavior(self, node: ast.WithSpecifier, scope: Environment) -> ModelValue:
+        """What `with behavior` gives, unless behaviors are left out or refused."""
+        if self.timed is None or self.timed.behaviors == "ignore":
+            self.dynamic("with behavior", node.span)
+            return None
+        return evaluate(self, node.value, scope)
 
     def default(self, definition: PropertyDefinition, instance: Instance) -> ModelValue:
         """The default of a property for an instance; see `specifiers.Evaluator`."""
@@ -333,6 +343,8 @@ class Interpreter:
                 record_statement(self, node, scope)
             case ast.DynamicStatement() | ast.DynamicDefinition() | ast.RequireMonitor() if self.timed is not None:
                 timed_statement(self, self.timed, node, scope)
+            case ast.Take() | ast.Do() | ast.TryInterrupt():
+                self.dynamic(node.kind, node.span)
             case ast.DynamicStatement() | ast.DynamicDefinition() | ast.RequireMonitor():
                 self.dynamic("require monitor" if isinstance(node, ast.RequireMonitor) else node.kind, node.span)
                 if isinstance(node, ast.DynamicDefinition) and node.name:

@@ -23,7 +23,7 @@ from scenicq.compiler.interpreter import Interpreter
 from scenicq.compiler.models import default_library, is_anywhere
 from scenicq.compiler.recorded_values import recorded_values
 from scenicq.compiler.requirements import RequireStatement
-from scenicq.compiler.temporal import Behaviors, TimedStatements
+from scenicq.compiler.temporal import REACTION_S, Behaviors, TimedStatements
 from scenicq.compiler.values import Choice, Instance, ModelValue, fail, is_node
 from scenicq.compiler.version_detection import decide_version
 from scenicq.errors import Diagnostic, ScenarioError, Source, Span
@@ -51,6 +51,7 @@ def compile_scenario(
     version: int | None = None,
     initial: bool = False,
     behaviors: Behaviors | None = None,
+    reaction_s: float = REACTION_S,
     loader: Loader | None = None,
     model: str | None = None,
     map_defaults: bool = True,
@@ -65,6 +66,7 @@ def compile_scenario(
         initial: Ignore dynamic parts instead of refusing them.
         behaviors: What becomes of behaviors, where the scenario is to be matched over time; None where it is about one
             instant, and all dynamic parts are refused or ignored.
+        reaction_s: Seconds after which what an object does must be seen.
         loader: Reads files that the program imports.
         model: The world model of a program that imports none, as Scenic's `--model`.
         map_defaults: Whether the world model's classes place and turn their objects as the map has it, where nothing
@@ -76,7 +78,7 @@ def compile_scenario(
     """
     try:
         with limited(LIMITS.program_seconds):
-            timed = None if initial or behaviors is None else TimedStatements(behaviors)
+            timed = None if initial or behaviors is None else TimedStatements(behaviors, reaction_s)
             return _compiled(
                 source, network, version, initial=initial, timed=timed, loader=loader, model=model,
                 map_defaults=map_defaults, gap_s=gap_s,

@@ -1,15 +1,18 @@
-"""What a program says about time is collected here: requirements with operators of time, what ends a run, monitors."""
+"""What a program says about time is collected here: requirements with operators of time, what ends a run, processes."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
 from scenicq.compiler.coerce import read_over_time
+from scenicq.compiler.coroutines import CoroutineCall, as_behavior
 from scenicq.compiler.exclusions import Exclusions
-from scenicq.compiler.values import fail
-from scenicq.errors import Span
+from scenicq.compiler.process_graph import process_of
+from scenicq.compiler.step_times import simulation, step_seconds
+from scenicq.compiler.values import Instance, ModelValue, fail
+from scenicq.errors import Diagnostic, Span
 from scenicq.forest.nodes import Constant, Feature, Node
 from scenicq.forest.temporal import (
     Always,
@@ -18,17 +21,15 @@ from scenicq.forest.temporal import (
     Dynamics,
     Eventually,
     Formula,
-    Monitor,
-    MonitorStep,
     Next,
     Not,
     Or,
-    Reject,
+    Process,
     TemporalRequirement,
     Termination,
-    Test,
     Until,
 )
+from scenicq.forest.value_numbers import ValueNumbers
 from scenicq.forest.walk import postorder
 from scenicq.syntax import ast, phrases
 from scenicq.syntax.walk import walk
@@ -36,10 +37,12 @@ from scenicq.syntax.walk import walk
 if TYPE_CHECKING:
     from scenicq.compiler.interpreter import Interpreter
 
-__all__ = ["Behaviors", "Deferred", "TimedStatements", "is_temporal"]
+__all__ = ["REACTION_S", "Behaviors", "Deferred", "TimedStatements", "is_temporal"]
 
-Behaviors = Literal["refuse", "ignore"]
-"""What becomes of behaviors: they are refused, or left out."""
+REACTION_S = 1.0
+"""Seconds after which what an object does must be seen, unless it is said."""
+Behaviors = Literal["motion", "guards", "ignore"]
+"""What becomes of behaviors: what they do must be seen, too; they run, and let every action pass; they are left out."""
 
 
 def _implication(left: Formula, right: Formula) -> Formula:
@@ -72,15 +75,22 @@ class TimedStatements:
 
     Attributes:
         behaviors: What becomes of behaviors.
+        reaction_s: Seconds after which what an object does must be seen.
         used: Whether the program has any statement about time: it is a dynamic one.
+        actions: The actions of behaviors that constrain nothing, each with its first place.
     """
 
     behaviors: Behaviors
+    reaction_s: float = REACTION_S
     used: bool = False
     _conditions: list[Callable[[], Node]] = field(default_factory=list[Callable[[], Node]])
     _requirements: list[TemporalRequirement] = field(default_factory=list[TemporalRequirement])
     _terminations: list[Termination] = field(default_factory=list[Termination])
-    _monitors: list[Monitor] = field(default_factory=list[Monitor])
+    _monitors: list[tuple[CoroutineCall, Span]] = field(default_factory=list["tuple[CoroutineCall, Span]"])
+    _behaviors: list[tuple[Instance, ModelValue, Span]] = field(
+        default_factory=list["tuple[Instance, ModelValue, Span]"]
+    )
+    actions: dict[str, Span] = field(default_factory=dict[str, Span])
 
     def require(self, deferred: Deferred, wanted: ast.Expression, span: Span) -> None:
         """Add a requirement with an operator of time."""
@@ -96,10 +106,17 @@ class TimedStatements:
         atom = None if condition is None else self.atom(condition)
         self._terminations.append(Termination(span, atom, after_s, simulation))
 
-    def watch(self, monitor: Monitor) -> None:
+    def watch(self, monitor: CoroutineCall, span: Span) -> None:
         """Add a monitor."""
         self.used = True
-        self._monitors.append(monitor)
+        self._monitors.append((monitor, span))
+
+    def behave(self, agent: Instance, behavior: ModelValue, span: Span) -> None:
+        """Add the behavior of an object, if it is not None."""
+        behavior = as_behavior(behavior, span)
+        if behavior is not None:
+            self.used = True
+            self._behaviors.append((agent, behavior, span))
 
     def atom(self, condition: Callable[[], Node]) -> Atom:
         """A condition on one sample."""
@@ -117,14 +134,11 @@ class TimedStatements:
         """
         if not self.used:
             return None, []
-        tested = {step.condition.number for each in self._monitors for step in each.steps if isinstance(step, Test)}
-        always, at_test = Exclusions(), {number: Exclusions() for number in tested}
-        of_scene = run.excluded
-        nodes: list[Node] = []
+        run.simulation = simulation(run)
+        always, of_scene = Exclusions(), run.excluded
+        run.excluded = always
         with read_over_time():
-            for number, condition in enumerate(self._conditions):
-                run.excluded = at_test.get(number, always)
-                nodes.append(condition())
+            nodes = [condition() for condition in self._conditions]
         run.excluded = of_scene
         for requirement in self._requirements:
             if _known(requirement.formula, nodes) is False:
@@ -138,13 +152,35 @@ class TimedStatements:
                 nodes.append(condition)
             else:
                 excluded.append((condition, span))
-        guards: dict[int, list[tuple[Atom, Span]]] = {}
-        for number, exclusions in at_test.items():
-            for condition, span in exclusions.conditions():
-                guards.setdefault(number, []).append((Atom(len(nodes)), span))
-                nodes.append(condition)
-        monitors = tuple(_guarded(monitor, guards) for monitor in self._monitors)
-        return Dynamics(tuple(nodes), tuple(requirements), tuple(self._terminations), monitors), excluded
+        processes = self._processes(run, nodes, requirements)
+        return Dynamics(tuple(nodes), tuple(requirements), tuple(self._terminations), processes), excluded
+
+    def _processes(
+        self, run: Interpreter, nodes: list[Node], requirements: list[TemporalRequirement]
+    ) -> tuple[Process, ...]:
+        """Monitors and behaviors; what they read is added to the conditions, what they ask for first is required."""
+        numbers, known = ValueNumbers(), dict[int, Atom]()
+
+        def atom(node: Node) -> Atom:
+            number = numbers.expression(node)
+            if number not in known:
+                known[number] = Atom(len(nodes))
+                nodes.append(node)
+            return known[number]
+
+        found: list[Process] = []
+        calls = [(None, call, span) for call, span in self._monitors] + self._behaviors
+        for number, (agent, call, span) in enumerate(calls):
+            reaction_s = self.reaction_s if self.behaviors == "motion" else None
+            process, asked = process_of(run, call, number, agent, atom, step_seconds, self.actions, span, reaction_s)
+            found.append(process)
+            for guards, node, place in asked:
+                wanted = [*guards, (node, place)]
+                requirements += [TemporalRequirement(atom(each), where) for each, where in wanted]
+        for name, place in self.actions.items() if self.behaviors == "motion" else ():
+            message = f"what `{name}` does is not compared"
+            run.ignored.append(Diagnostic("unseen-action", message, place, severity="note"))
+        return tuple(found)
 
     def _formula(self, deferred: Deferred, node: ast.Expression) -> Formula:
         if not is_temporal(node):
@@ -160,18 +196,6 @@ class TimedStatements:
             case _:
                 # evaluating it says what is wrong with an operator of time inside
                 return self.atom(deferred(node))
-
-
-def _guarded(monitor: Monitor, guards: Mapping[int, list[tuple[Atom, Span]]]) -> Monitor:
-    """The monitor, rejecting where it comes to a test whose guards do not hold; guards by number of the condition."""
-    steps: list[MonitorStep] = list(monitor.steps)
-    for number, step in enumerate(monitor.steps):
-        if not isinstance(step, Test):
-            continue
-        for guard, span in guards.get(step.condition.number, ()):
-            steps += [steps[number], Reject(span)]
-            steps[number] = Test(guard, len(steps) - 2, len(steps) - 1)
-    return Monitor(monitor.span, tuple(steps))
 
 
 def _known(formula: Formula, nodes: Sequence[Node]) -> bool | None:

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import StrEnum
+from itertools import count
 from typing import ClassVar, Literal, TypeAlias
 
 from scenicq.errors import Span
@@ -24,61 +25,12 @@ from scenicq.geometry.network import Network
 from scenicq.geometry.regions import Region
 
 __all__ = [
-    "COURSE",
-    "ELEMENT",
-    "GIVEN",
-    "IDENTITY",
-    "MIRRORED",
-    "RANK",
-    "TRACK",
-    "WHO",
-    "Among",
-    "AmongOp",
-    "Arithmetic",
-    "ArithmeticOp",
-    "Bearing",
-    "Body",
-    "Compare",
-    "CompareOp",
-    "Constant",
-    "Contains",
-    "Coordinate",
-    "Corridor",
-    "CourseCoordinate",
-    "DirectionAt",
-    "DiscAt",
-    "DiscreteRange",
-    "Distance",
-    "Encloses",
-    "Feature",
-    "Identity",
-    "Index",
-    "Intersects",
-    "Kind",
-    "LaneCourse",
-    "Leaf",
-    "Logic",
-    "LogicOp",
-    "Measure",
-    "Node",
-    "Norm",
-    "Normal",
-    "PointIn",
-    "Range",
-    "RectangleAt",
-    "RegionDifference",
-    "RegionIntersection",
-    "RegionUnion",
-    "Rotate",
-    "Scale",
-    "SectorAt",
-    "Select",
-    "TruncatedNormal",
-    "Undefined",
-    "Value",
-    "Vector",
-    "VectorOf",
-    "VectorSum",
+    "CLOCK", "COURSE", "ELEMENT", "GIVEN", "IDENTITY", "MIRRORED", "PAST", "RANK", "TRACK", "WHO",
+    "Among", "AmongOp", "Arithmetic", "ArithmeticOp", "Bearing", "Body", "Compare", "CompareOp", "Constant", "Contains",
+    "Coordinate", "Corridor", "CourseCoordinate", "DirectionAt", "DiscAt", "DiscreteRange", "Distance", "Encloses",
+    "Feature", "Identity", "Index", "Intersects", "Kind", "LaneCourse", "Leaf", "Logic", "LogicOp", "Measure", "Node", "Norm",
+    "Normal", "PointIn", "Range", "RectangleAt", "RegionDifference", "RegionIntersection", "RegionUnion", "Rotate",
+    "Scale", "SectorAt", "Select", "TruncatedNormal", "Undefined", "Value", "Vector", "VectorOf", "VectorSum",
 ]  # fmt: skip
 
 Vector: TypeAlias = tuple[float, float]
@@ -100,6 +52,10 @@ Value: TypeAlias = float | bool | str | Vector | Region | VectorField | CoursePl
 
 COURSE = "driven course"
 """The property of an object that is its course; no program can give one of such a name."""
+CLOCK = "time of the sample"
+"""The property of any object that is the time of a sample, in seconds from a moment of its recording."""
+PAST = "past value of "
+"""How the names of properties begin that no label observes: what they were at a sample that is not kept."""
 
 
 class ArithmeticOp(StrEnum):
@@ -184,7 +140,15 @@ class _Boolean(_Node):
 class Identity:
     """What makes a random variable the same one, however its distribution's parameters are rewritten."""
 
-    __slots__ = ()
+    __slots__ = ("order",)
+
+    def __init__(self) -> None:
+        """Be the next one."""
+        self.order = next(_ORDER)
+
+
+_ORDER = count()
+"""Numbers random variables as they are made, so that those of a moment can be told from later ones."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,4 +1,4 @@
-"""What a scenario says about time: formulas over conditions on one instant, monitors, and when it ends.
+"""What a scenario says about time: formulas over conditions on one instant, processes, and when it ends.
 
 Formulas are those of Scenic 3.1's requirements: linear temporal logic over finite traces (LTLf), `next` strong. Their
 atoms are boolean expressions of the forest, read at one sample of a recording.
@@ -15,17 +15,20 @@ from scenicq.forest.nodes import Node
 __all__ = [
     "Always",
     "And",
+    "Arm",
     "Atom",
+    "Choose",
+    "Due",
     "Dynamics",
     "End",
     "Eventually",
     "Formula",
     "Goto",
-    "Monitor",
-    "MonitorStep",
     "Next",
     "Not",
     "Or",
+    "Process",
+    "ProcessStep",
     "Reject",
     "TemporalRequirement",
     "Terminate",
@@ -34,6 +37,7 @@ __all__ = [
     "Until",
     "Wait",
     "operands",
+    "successors",
 ]
 
 
@@ -154,15 +158,48 @@ class Goto:
 
 @dataclass(frozen=True, slots=True)
 class Wait:
-    """Goes on with a step at a later sample.
+    """Goes on with a step at the next sample.
 
     Attributes:
         then: The step.
-        for_s: The sample is the first one so many seconds later, and at least the next one.
+        timers: The timers that go on; others are forgotten.
     """
 
     then: int
-    for_s: float = 0.0
+    timers: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Arm:
+    """Starts a timer, and goes on with another step within the same sample.
+
+    Attributes:
+        timer: Its number within the process.
+        after_s: It is due at the first sample so many seconds later, and at least the next one.
+        then: The step.
+        extends: Whether it goes on instead if it runs, and is due no sooner than it was.
+    """
+
+    timer: int
+    after_s: float
+    then: int
+    extends: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Due:
+    """Goes on with one of two steps, within the same sample, by whether the time of a timer is over."""
+
+    timer: int
+    then: int
+    otherwise: int
+
+
+@dataclass(frozen=True, slots=True)
+class Choose:
+    """Goes on with any of some steps, within the same sample: a match is a run in which one of them leads to one."""
+
+    options: tuple[int, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,30 +211,51 @@ class Terminate:
 
 @dataclass(frozen=True, slots=True)
 class Reject:
-    """A `require` of the monitor does not hold: no match."""
+    """What the process asks for does not hold: no match."""
 
     span: Span
 
 
 @dataclass(frozen=True, slots=True)
 class End:
-    """The monitor is over, and says nothing any more."""
+    """The process is over, and says nothing any more."""
 
 
-MonitorStep: TypeAlias = Test | Goto | Wait | Terminate | Reject | End
+ProcessStep: TypeAlias = Test | Goto | Wait | Arm | Due | Choose | Terminate | Reject | End
+
+
+def successors(step: ProcessStep) -> tuple[int, ...]:
+    """The steps that may follow one within the same sample."""
+    match step:
+        case Test() | Due():
+            return step.then, step.otherwise
+        case Goto() | Arm():
+            return (step.then,)
+        case Choose():
+            return step.options
+        case _:
+            return ()
 
 
 @dataclass(frozen=True, slots=True)
-class Monitor:
-    """A monitor as a graph of steps, of which it goes through some at each sample; it begins with the first.
+class Process:
+    """A monitor, or the behavior of an object, as a graph of steps, of which it goes through some at each sample.
 
     Attributes:
-        span: Where the program requires it.
-        steps: They refer to each other by their numbers; every circle holds a `Wait`.
+        span: Where the program requires it, or gives it to the object.
+        steps: They refer to each other by their numbers, and it begins with the first. A run in which it goes in a
+            circle without a `Wait` is none.
+        object: Whose behavior it is; None for a monitor.
     """
 
     span: Span
-    steps: tuple[MonitorStep, ...]
+    steps: tuple[ProcessStep, ...]
+    object: int | None = None
+
+    @property
+    def terminates(self) -> bool:
+        """Whether it may end the run."""
+        return any(isinstance(step, Terminate) for step in self.steps)
 
 
 @dataclass(frozen=True, slots=True)
@@ -208,19 +266,18 @@ class Dynamics:
         conditions: Boolean expressions, each about one sample: what atoms are.
         requirements: Requirements with operators of time.
         terminations: What ends a run; without any it may end anywhere.
-        monitors: Monitors that are required.
+        processes: Monitors that are required, then behaviors of objects, in the order in which they run.
     """
 
     conditions: tuple[Node, ...] = ()
     requirements: tuple[TemporalRequirement, ...] = ()
     terminations: tuple[Termination, ...] = ()
-    monitors: tuple[Monitor, ...] = ()
+    processes: tuple[Process, ...] = ()
 
     @property
     def terminates(self) -> bool:
         """Whether the program says when it ends."""
-        steps = (step for monitor in self.monitors for step in monitor.steps)
-        return bool(self.terminations) or any(isinstance(step, Terminate) for step in steps)
+        return bool(self.terminations) or any(process.terminates for process in self.processes)
 
     @property
     def time_limit_s(self) -> float | None:

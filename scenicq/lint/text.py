@@ -358,9 +358,8 @@ def _unused(nodes: list[ast.SyntaxNode]) -> Iterator[Diagnostic]:
     written = {id(target) for target, _ in assigned}
     read = {node.id for node in nodes if isinstance(node, ast.Name) and id(node) not in written}
     read |= {item.id for node in nodes if isinstance(node, ast.Global | ast.Nonlocal) for item in node.names}
-    # what is skipped because it happens over time may read anything
-    timed = (node for node in nodes if isinstance(node, ast.DynamicDefinition | ast.DynamicStatement))
-    if any(not node.kind.startswith("record") for node in timed):
+    # what is skipped may read anything
+    if any(isinstance(node, ast.DynamicDefinition) and not node.body for node in nodes):
         return
     held = {id(line) for node in nodes if isinstance(node, ast.ClassDef) for line in node.body}
     told: set[str] = set()

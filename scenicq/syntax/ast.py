@@ -2,7 +2,7 @@
 
 Every node is a frozen value whose first field is the `Span` of the text it was read from. Parentheses leave no node.
 The unions at the end (`Expression`, `Specifier`, `Statement`) are closed, so that a `match` over one can end in
-`assert_never`. What cannot describe a single instant (behaviors, `do`, `record`, ...) is kept as a place only.
+`assert_never`. What is not read (scenarios, `record`, ...) is kept as a place only.
 """
 
 from __future__ import annotations
@@ -443,7 +443,7 @@ class ExceptHandler(SyntaxNode):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Try(SyntaxNode):
-    """`try`, `except`, `else`, `finally` (`interrupt when` makes it a `DynamicStatement`)."""
+    """`try`, `except`, `else`, `finally` (`interrupt when` makes it a `TryInterrupt`)."""
 
     body: tuple[Statement, ...]
     handlers: tuple[ExceptHandler, ...]
@@ -593,17 +593,17 @@ class Simulator(SyntaxNode):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DynamicStatement(SyntaxNode):
-    """What happens over time, skipped with its body but for what ends a run.
+    """A statement of one line about what happens over time.
 
     Kinds: `terminate when`, `terminate after`, `terminate simulation`, `terminate`, `record`, `record initial`,
-    `record final`, `do`, `do choose`, `do shuffle`, `take`, `wait`, `wait for`, `wait until`, `abort`, `invoke`,
-    `override`, `try/interrupt`.
+    `record final`, `wait`, `wait for`, `wait until`, `abort`, `override`, `precondition`, `invariant`; of `record` and
+    `override` only the place is kept.
 
     Attributes:
         kind: Which.
-        operand: The condition of `terminate when` and `terminate simulation when`, the number of `terminate after`, the
-            value of `record`.
-        unit: "seconds" or "steps" for `terminate after`.
+        operand: The condition of `terminate when`, `terminate simulation when` and the like, the number of
+            `terminate after` and `wait for`, the value of `record`.
+        unit: "seconds" or "steps" for `terminate after` and `wait for`.
         name: What `record` calls its value; "" where it does not say.
         manners: `every`, `after`, `to`: what `record` says of how it is recorded.
     """
@@ -616,17 +616,77 @@ class DynamicStatement(SyntaxNode):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Take(SyntaxNode):
+    """`take action, ...`."""
+
+    actions: tuple[Expression, ...]
+
+    @property
+    def kind(self) -> str:
+        """What messages call it."""
+        return "take"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Do(SyntaxNode):
+    """`do behavior, ... [until condition | for number unit]`, `do choose ...`, `do shuffle ...`.
+
+    Attributes:
+        behaviors: What is done.
+        schedule: "choose", "shuffle" or "".
+        until: The condition that ends it.
+        duration: The time after which it ends.
+        unit: "seconds" or "steps" for a duration.
+    """
+
+    behaviors: tuple[Expression, ...]
+    schedule: str = ""
+    until: Expression | None = None
+    duration: Expression | None = None
+    unit: str = ""
+
+    @property
+    def kind(self) -> str:
+        """What messages call it."""
+        return f"do {self.schedule}".strip()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Interrupt(SyntaxNode):
+    """`interrupt when condition: body`."""
+
+    condition: Expression
+    body: tuple[Statement, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TryInterrupt(SyntaxNode):
+    """`try` with `interrupt when`, and what else belongs to a `try`."""
+
+    body: tuple[Statement, ...]
+    interrupts: tuple[Interrupt, ...]
+    handlers: tuple[ExceptHandler, ...] = ()
+    orelse: tuple[Statement, ...] = ()
+    final: tuple[Statement, ...] = ()
+
+    @property
+    def kind(self) -> str:
+        """What messages call it."""
+        return "try/interrupt"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class DynamicDefinition(SyntaxNode):
-    """A definition of what happens over time, skipped with its body but for monitors; unnamed blocks have no name.
+    """A definition of what happens over time; unnamed blocks have no name.
 
     Kinds: `behavior`, `monitor`, `scenario`, `setup`, `compose`, `precondition`, `invariant`. The span ends with the
-    header's colon.
+    header's colon. What is no behavior and no monitor is kept as a place only.
 
     Attributes:
         kind: Which.
         name: Its name.
-        parameters: What a monitor takes.
-        body: What a monitor does.
+        parameters: What a behavior or monitor takes.
+        body: What it does.
     """
 
     kind: str
@@ -685,6 +745,6 @@ Statement: TypeAlias = (
     ExpressionStatement | Assign | AugmentedAssign | AnnotatedAssign | If | For | While | Break | Continue | Pass
     | FunctionDef | Return | Delete | Assert | Raise | Try | WithStatement | PropertyDefault | ClassDef | Import
     | ImportFrom | Global | Nonlocal | UnsupportedStatement | Model | Param | Require | RequireMonitor | Mutate
-    | Simulator | DynamicStatement | DynamicDefinition
+    | Simulator | DynamicStatement | DynamicDefinition | Take | Do | TryInterrupt
 )  # fmt: skip
 """What stands in a block."""

@@ -28,6 +28,9 @@ _BLOCKS = frozenset(("setup", "compose", "precondition", "invariant"))
 class ProgramParser(ExpressionParser):
     """Reads whole programs."""
 
+    guarded = False
+    """Whether the body of a behavior or monitor is read, where `precondition:` and `invariant:` may stand."""
+
     # --- blocks, and Python's statements that have one
 
     def body(self) -> tuple[ast.Statement, ...]:
@@ -243,11 +246,27 @@ class ProgramParser(ExpressionParser):
         """Read `try` and its handlers."""
         start = self.advance().start
         body = self.block("`try`")
-        handlers: list[ast.ExceptHandler] = []
         if self.text == "interrupt" and self.peek().text == "when":
-            while self.text in ("interrupt", "except", "else", "finally"):
-                self.skip()
-            return ast.DynamicStatement(self.span(start), "try/interrupt")
+            return self.try_interrupt(start, body)
+        handlers = self.handlers(start, needed=True)
+        return ast.Try(self.span(start), body, *handlers)
+
+    def try_interrupt(self, start: int, body: tuple[ast.Statement, ...]) -> ast.Statement:
+        """Read what follows the body of a `try` that may be interrupted."""
+        interrupts: list[ast.Interrupt] = []
+        while self.text == "interrupt" and self.peek().text == "when":
+            place = self.advance().start
+            self.advance()
+            condition = self.expression()
+            interrupts.append(ast.Interrupt(self.span(place), condition, self.block("the condition")))
+        handlers = self.handlers(start, needed=False)
+        return ast.TryInterrupt(self.span(start), body, tuple(interrupts), *handlers)
+
+    def handlers(
+        self, start: int, *, needed: bool
+    ) -> tuple[tuple[ast.ExceptHandler, ...], tuple[ast.Statement, ...], tuple[ast.Statement, ...]]:
+        """Read `except`, `else` and `finally` of a `try`."""
+        handlers: list[ast.ExceptHandler] = []
         while self.text == "except":
             place = self.advance().start
             self.accept("*")
@@ -257,9 +276,9 @@ class ProgramParser(ExpressionParser):
             handlers.append(ast.ExceptHandler(self.span(place), kind, name, handler))
         orelse = self.else_() if handlers else ()
         final = self.block("`finally`") if self.accept("finally") else ()
-        if not handlers and not final:
+        if needed and not handlers and not final:
             raise self.fail("`try` has neither `except` nor `finally`", self.token_span(self.token_at(start)))
-        return ast.Try(self.span(start), body, tuple(handlers), orelse, final)
+        return tuple(handlers), orelse, final
 
     def token_at(self, start: int) -> Token:
         """The token that starts at the offset, at or before this place."""
@@ -566,11 +585,11 @@ class ProgramParser(ExpressionParser):
         return ast.Mutate(self.span(start), tuple(objects), scale)
 
     def definition(self, kind: str) -> ast.Statement:
-        """Read a monitor, or read past another definition of what happens over time."""
+        """Read a behavior or monitor, or read past another definition of what happens over time."""
         start = self.advance().start
         name = self.advance().text if kind in _DEFINITIONS else ""
-        if kind == "monitor":
-            return self.monitor(start, name)
+        if kind in ("behavior", "monitor"):
+            return self.coroutine(start, kind, name)
         if self.text == "(":
             self.move(self.closing(self.index))
             self.advance()
@@ -579,14 +598,23 @@ class ProgramParser(ExpressionParser):
         self.skip()
         return node
 
-    def monitor(self, start: int, name: str) -> ast.Statement:
-        """Read the parameters of a monitor, if it has any, and its body."""
+    def coroutine(self, start: int, kind: str, name: str) -> ast.Statement:
+        """Read the parameters of a behavior or monitor, if it has any, and its body."""
         parameters: tuple[ast.Parameter, ...] = ()
         if self.accept("("):
             parameters = self.parameters(")")
             self.advance()
         header = Span(self.source, start, self.token.end)
-        return ast.DynamicDefinition(header, "monitor", name, parameters, self.block("the header of the monitor"))
+        around, self.guarded = self.guarded, True
+        body = self.block(f"the header of the {kind}")
+        self.guarded = around
+        return ast.DynamicDefinition(header, kind, name, parameters, body)
+
+    def guard(self, kind: str) -> ast.Statement:
+        """Read `precondition: condition` or `invariant: condition`."""
+        start = self.advance().start
+        self.advance()
+        return ast.DynamicStatement(self.span(start), kind, self.expression())
 
     def terminate(self, kind: str) -> ast.Statement:
         """Read `terminate when`, `terminate after` or `terminate simulation`."""
@@ -607,6 +635,35 @@ class ProgramParser(ExpressionParser):
         operand = self.expression()
         unit = self.unit() if kind == "wait for" else ""
         return ast.DynamicStatement(self.span(start), kind, operand, unit)
+
+    def do(self) -> ast.Statement:
+        """Read `do`, or its older name `invoke`."""
+        start = self.advance().start
+        schedule = self.advance().text if self.text in ("choose", "shuffle") else ""
+        behaviors = self.several()
+        until = duration = None
+        unit = ""
+        if self.accept("until"):
+            until = self.expression()
+        elif self.accept("for"):
+            duration = self.expression()
+            unit = self.unit()
+        return ast.Do(self.span(start), behaviors, schedule, until, duration, unit)
+
+    def take(self) -> ast.Statement:
+        """Read `take`."""
+        start = self.advance().start
+        actions = self.several()
+        return ast.Take(self.span(start), actions)
+
+    def several(self) -> tuple[ast.Expression, ...]:
+        """Read expressions separated by commas, the last of which may follow them."""
+        found: list[ast.Expression] = []
+        while not found or self.accept(","):
+            if found and self.at_line_end():
+                break
+            found.append(self.expression())
+        return tuple(found)
 
     def record(self, kind: str) -> ast.Statement:
         """Read `record`, `record initial` or `record final`."""
@@ -633,7 +690,7 @@ class ProgramParser(ExpressionParser):
         return self.advance().text
 
     def dynamic(self, word: str) -> ast.Statement | None:
-        """Read past a statement about what happens over time, or nothing where none starts."""
+        """Read a statement about what happens over time, or nothing where none starts."""
         kind = self.dynamic_kind(word, self.peek().text)
         if not kind:
             return None
@@ -641,6 +698,12 @@ class ProgramParser(ExpressionParser):
             return self.terminate(kind)
         if kind in ("wait for", "wait until"):
             return self.wait(kind)
+        if kind in ("precondition", "invariant"):
+            return self.guard(kind)
+        if word in ("do", "invoke"):
+            return self.do()
+        if word == "take":
+            return self.take()
         if kind.startswith("record"):
             return self.record(kind)
         start = self.token.start
@@ -673,5 +736,7 @@ class ProgramParser(ExpressionParser):
                 return word if following in ("", ";") else ""
             case "abort":
                 return word if following in ("", ";") else ""
+            case "precondition" | "invariant":
+                return word if self.guarded and following == ":" else ""
             case _:
                 return ""

@@ -24,14 +24,14 @@ from scenicq.forest.condition import expand
 from scenicq.forest.course_ends import has_ends
 from scenicq.forest.ego_frame import DISTANCE, PLACE
 from scenicq.forest.interpret import OnMap, Steps, interpret, steps_of
-from scenicq.forest.nodes import COURSE, Among, DirectionAt, Feature, Identity, LaneCourse, Leaf, Node, Value
+from scenicq.forest.nodes import COURSE, PAST, Among, DirectionAt, Feature, Identity, LaneCourse, Leaf, Node, Value
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.temporal import Atom
 from scenicq.forest.unobserved import certain_and_possible
 from scenicq.forest.walk import children, is_leaf, leaves, postorder
 from scenicq.limits import LIMITS
 from scenicq.temporal.grouping import alike
-from scenicq.temporal.samples import FIXED, MOVING, BoundSamples, Observed
+from scenicq.temporal.samples import FIXED, BoundSamples, Observed, is_moving
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
 __all__ = ["AtomColumns", "UnclearVariable", "reads_start"]
@@ -264,7 +264,7 @@ class AtomColumns:
         return np.where(observed, found, -1)
 
     def _definition(self, feature: Feature) -> Node | None:
-        if feature.property in MOVING or self._feature(feature) is not None:
+        if is_moving(feature.property) or self._feature(feature) is not None:
             return None
         return self.scenario.objects[feature.object].properties[feature.property].value
 
@@ -379,6 +379,8 @@ class AtomColumns:
         if name in (PLACE, DISTANCE):
             assert isinstance(self.samples, BoundSamples)
             return self.samples.seen(self.scenario.ego, index, name)
+        if name.startswith(PAST):
+            return None
         if name == COURSE:
             rules = self.scenario.objects[index].properties[COURSE].value
             assert isinstance(rules, LaneCourse)

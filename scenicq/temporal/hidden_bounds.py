@@ -93,7 +93,7 @@ def _ends(
     first, latest = due, np.minimum(due, last)
     conditions = [each.condition for each in machine.dynamics.terminations if each.condition is not None]
     unclear = any(each.number in hidden.of for each in conditions) or len(required.ends) < len(conditions)
-    if machine.dynamics.monitors or unclear:
+    if machine.dynamics.processes or unclear:
         first = starts
     for each in conditions:
         if each.number not in hidden.of:

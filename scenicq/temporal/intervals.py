@@ -38,7 +38,7 @@ from scenicq.temporal.presence import by_presence
 from scenicq.temporal.run_lanes import follow_runs
 from scenicq.temporal.run_machine import RunMachine
 from scenicq.temporal.runs import Detail, Runs
-from scenicq.temporal.samples import MOVING
+from scenicq.temporal.samples import is_moving
 from scenicq.temporal.selection import chosen
 from scenicq.temporal.stretches import StartTable, Stretches, stretches_of
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
@@ -152,7 +152,7 @@ class IntervalMatcher:
             return TrackReach(0.0, self.options.gap_s, gaps=True)
         limit_s = dynamics.time_limit_s
         # of what does not change, one observation anywhere counts
-        moving = all(name in MOVING for _, name in features(*dynamics.conditions))
+        moving = all(is_moving(name) for _, name in features(*dynamics.conditions))
         return TrackReach(limit_s, self.options.gap_s) if limit_s is not None and moving else None
 
     def intervals(self, table: StartTable, remember: Callable[[int], Remembered], *, every: bool = True) -> Reported:

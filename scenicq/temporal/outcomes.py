@@ -24,7 +24,7 @@ from scenicq.match.problem.conditioned import options_of
 from scenicq.match.verdict import WitnessValue
 from scenicq.temporal.hidden import has_cuts
 from scenicq.temporal.literals import literals_of
-from scenicq.temporal.samples import MOVING
+from scenicq.temporal.samples import is_moving
 
 __all__ = ["Outcome", "outcomes_of", "place_of", "steady_value"]
 
@@ -72,7 +72,7 @@ def place_of(leaf: Leaf) -> str:
 
 def steady_value(scenario: Scenario, feature: Feature) -> Node | None:
     """What the program says of a property that does not change, should no label tell."""
-    if feature.property in MOVING:
+    if is_moving(feature.property):
         return None
     return scenario.objects[feature.object].properties[feature.property].value
 

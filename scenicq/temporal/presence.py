@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scenicq.forest.groups import PARAMS
 from scenicq.forest.nodes import COURSE, Node
 from scenicq.forest.walk import features
-from scenicq.temporal.samples import MOVING, BoundSamples
+from scenicq.temporal.samples import BoundSamples, is_moving
 
 __all__ = ["by_presence", "observes"]
 
@@ -30,7 +30,7 @@ def by_presence(
         stretches: Numbers of places with which stretches begin: a feature that is observed somewhere in one counts as
             observed all over it. Without them each place is one of its own.
     """
-    wanted = sorted({each for each in features(*conditions) if each[1] not in MOVING and each[0] != PARAMS})
+    wanted = sorted({each for each in features(*conditions) if not is_moving(each[1]) and each[0] != PARAMS})
     seen = [_present(places, index, name) for index, name in wanted]
     if stretches is not None and len(stretches):
         lengths = np.diff(np.append(stretches, len(places)))

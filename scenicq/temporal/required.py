@@ -12,7 +12,6 @@ from scenicq.forest.temporal import (
     Eventually,
     Formula,
     Next,
-    Terminate,
     Until,
 )
 
@@ -57,7 +56,7 @@ class Required:
                     stack.append((formula.right, "later"))
                 case _:
                     pass
-        monitored = any(isinstance(step, Terminate) for each in dynamics.monitors for step in each.steps)
+        monitored = any(each.terminates for each in dynamics.processes)
         ends = tuple(each.condition for each in dynamics.terminations if each.condition is not None)
         now, always, later = (tuple(when[at]) for at in ("now", "always", "later"))
         return cls(now, always, later, () if monitored else ends, dynamics.time_limit_s)

@@ -2,7 +2,8 @@
 
 Runs that stand in one situation before one sample go on alike, so what becomes of them is found once. Where conditions
 hang on hidden numbers, a run is split into pieces by the values of these for which it goes on alike: at a sample whose
-cut lies within a piece, it falls in two. Pieces of one start that touch and stand alike again are joined.
+cut lies within a piece, it falls in two. Pieces of one start that touch and stand alike again are joined. Where a
+behavior chooses, it falls in one for each choice.
 """
 
 from __future__ import annotations
@@ -51,7 +52,7 @@ def follow_runs(
     for which in _at_once(machine, len(timeline.starts)):
         steps = RunSteps(machine, timeline, atom, which, hidden)
         # each run has a time of its own, or what becomes of all that stand alike is the same
-        alike = hidden is None and not machine.timed and not steps.limited
+        alike = hidden is None and not machine.timed and not machine.chooses and not steps.limited
         parts.append(_together(steps) if alike else _apart(steps, possible))
     return Runs.joined(parts)
 
@@ -163,13 +164,14 @@ def _apart(steps: RunSteps, possible: tuple[Numbers, Numbers] | None) -> Runs:
             notes.failed[lost] = ahead.at[lost] - 1
             ended |= lost
         over.append((owner[ended], notes.some(ended), ahead.some(ended)))
-        owner, notes, ahead = _merged(owner[~ended], notes.some(~ended), ahead.some(~ended))
+        left = owner[~ended], notes.some(~ended), ahead.some(~ended)
+        owner, notes, ahead = _merged(*left, chooses=steps.machine.chooses)
         many = np.bincount(owner, minlength=len(steps.which))[owner] > LIMITS.run_pieces
         if many.any():
-            left = notes.some(many)
-            left.undecided[:] = True
-            left.possible = np.maximum(left.possible, ahead.at[many])
-            over.append((owner[many], left, ahead.some(many)))
+            open_ = notes.some(many)
+            open_.undecided[:] = True
+            open_.possible = np.maximum(open_.possible, ahead.at[many])
+            over.append((owner[many], open_, ahead.some(many)))
             owner, notes, ahead = owner[~many], notes.some(~many), ahead.some(~many)
         stops = steps.exits(ahead)
     of = np.concatenate([each[0] for each in over])
@@ -224,11 +226,23 @@ def _closed(steps: RunSteps, notes: Notes, of: NDArray[np.int64]) -> Runs:
     return runs
 
 
-def _merged(owner: NDArray[np.int64], notes: Notes, ahead: Ahead) -> tuple[NDArray[np.int64], Notes, Ahead]:
+def _merged(
+    owner: NDArray[np.int64], notes: Notes, ahead: Ahead, *, chooses: bool
+) -> tuple[NDArray[np.int64], Notes, Ahead]:
     """Pieces with those joined that touch, are of one run, stand in one situation and were alike before.
 
     Those of a run are all before the same place.
     """
+    if chooses and len(owner) > 1:
+        # of lanes that stand alike one will do
+        columns = (owner, ahead.situation, *ahead.low.T, *ahead.high.T, *notes.columns())
+        order = np.lexsort(columns)
+        new = np.zeros(len(order), np.bool_)
+        new[0] = True
+        for column in columns:
+            new[1:] |= column[order][1:] != column[order][:-1]
+        kept = np.sort(order[new])
+        owner, notes, ahead = owner[kept], notes.some(kept), ahead.some(kept)
     if len(owner) < 2 or ahead.low.shape[1] != 1:
         return owner, notes, ahead
     low, high = ahead.low[:, 0], ahead.high[:, 0]

@@ -1,8 +1,9 @@
-"""What a program says about time as one machine: requirements, what ends a run, and monitors, stepped over samples.
+"""What a program says about time as one machine: requirements, what ends a run, monitors and behaviors, over samples.
 
-A mode says where a run stands: what is left of each requirement, and the step of each monitor. What is not observed at
+A mode says where a run stands: what is left of each requirement, and the step of each process. What is not observed at
 a sample may hold or not, there in all that reads it alike; so of a run a set of modes is known, one for each way that
-this may come out. A run is unknown only if two of these ways end differently.
+this may come out. A run is unknown only if two of these ways end differently. Where a behavior chooses, there is a run
+for each choice, and any of them may match.
 """
 
 from __future__ import annotations
@@ -13,7 +14,23 @@ from typing import assert_never
 
 from scenicq.budget import Exhausted
 from scenicq.errors import Span
-from scenicq.forest.temporal import Atom, Dynamics, End, Formula, Goto, Monitor, Reject, Terminate, Test, Wait, operands
+from scenicq.forest.temporal import (
+    Arm,
+    Atom,
+    Choose,
+    Due,
+    Dynamics,
+    End,
+    Formula,
+    Goto,
+    Process,
+    Reject,
+    Terminate,
+    Test,
+    Wait,
+    operands,
+    successors,
+)  # fmt: skip
 from scenicq.limits import LIMITS, exhausted
 from scenicq.temporal.literals import Literal, literals_of
 from scenicq.temporal.progression import LOST, Progression, Rest, accepts
@@ -22,18 +39,21 @@ from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN
 __all__ = ["Advance", "RunMachine", "Situation"]
 
 
-_OVER, _REJECTED = (-1, 0), (-2, 0)
-"""A monitor that says nothing any more, and one that has rejected the run."""
-
-_Place = tuple[int, int]
-"""The step of a monitor, and the first place of a sample at which it goes on there."""
+_Place = tuple[int, tuple[tuple[int, int], ...]]
+"""The step of a process, and its timers, each with the first place of a sample at which its time is over."""
+_OVER: _Place = (-1, ())
+"""A process that says nothing any more."""
+_REJECTED: _Place = (-2, ())
+"""One that has rejected the run."""
+_REJECTS: _Place = (-3, ())
+"""A behavior that rejects the run unless it ends with the sample: behaviors say what happens after it."""
 _Later = Callable[[float], int]
 """The first place of a sample that is so many seconds later, and at least the next one."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Mode:
-    """What is left of each requirement, and the step of each monitor."""
+    """What is left of each requirement, and the step of each process."""
 
     rests: tuple[Rest, ...]
     places: tuple[_Place, ...]
@@ -46,7 +66,7 @@ class _Mode:
     @property
     def is_lost(self) -> bool:
         """Whether no run that goes on from it is a match."""
-        return _REJECTED in self.places or LOST in self.rests
+        return _REJECTED in self.places or _REJECTS in self.places or LOST in self.rests
 
 
 _Modes = frozenset[_Mode]
@@ -99,6 +119,18 @@ class _NotObserved(Exception):
         self.atom = atom
 
 
+class _ToChoose(Exception):
+    """A choice that is open: the number of the process and of its step, and of how many."""
+
+    def __init__(self, step: tuple[int, int], count: int) -> None:
+        super().__init__()
+        self.step, self.count = step, count
+
+
+_Choices = Mapping[tuple[int, int], int]
+"""Which option each step of a process takes that is a choice."""
+
+
 @dataclass(eq=False)
 class RunMachine:
     """A program made ready to be followed.
@@ -107,18 +139,20 @@ class RunMachine:
         dynamics: The program.
         situations: All that have been met so far; a run begins in the first.
         atoms: The numbers of the atoms that the program reads.
-        timed: Whether a monitor waits for a time: then a situation is one of a single run.
+        timed: Whether a process has a timer: then a situation is one of a single run.
+        chooses: Whether a process chooses: then a run may go on as several.
     """
 
     dynamics: Dynamics
     situations: list[Situation] = field(init=False, default_factory=list[Situation])
     atoms: tuple[int, ...] = field(init=False)
     timed: bool = field(init=False)
+    chooses: bool = field(init=False)
     _progression: Progression = field(init=False, default_factory=Progression)
     _literals: dict[int, Literal] = field(init=False)
     _numbers: dict[_Modes, int] = field(init=False, default_factory=dict["_Modes", int])
-    _known: dict[tuple[int, tuple[int, ...], bool, int], Advance] = field(
-        init=False, default_factory=dict["tuple[int, tuple[int, ...], bool, int]", Advance]
+    _known: dict[tuple[int, tuple[int, ...], bool, int], tuple[Advance, ...]] = field(
+        init=False, default_factory=dict["tuple[int, tuple[int, ...], bool, int]", "tuple[Advance, ...]"]
     )
     _ways: dict[tuple[_Mode, tuple[int, ...], bool, int], tuple[tuple[_Mode, bool], ...]] = field(
         init=False, default_factory=dict["tuple[_Mode, tuple[int, ...], bool, int]", "tuple[tuple[_Mode, bool], ...]"]
@@ -132,12 +166,15 @@ class RunMachine:
         self._behind = [each.condition.number for each in ends if each.condition and each.simulation]
         formulas = [each.formula for each in dynamics.requirements]
         self._of_formulas = [frozenset(_atoms(each)) for each in formulas]
-        self._of_monitors = [_reads(each) for each in dynamics.monitors]
-        every = {*self._before, *self._behind}.union(*self._of_formulas, *(s for m in self._of_monitors for s in m))
+        self._of_processes = [_reads(each) for each in dynamics.processes]
+        every = {*self._before, *self._behind}.union(*self._of_formulas, *(s for m in self._of_processes for s in m))
         self.atoms = tuple(sorted(every))
-        steps = [step for monitor in dynamics.monitors for step in monitor.steps]
+        steps = [step for process in dynamics.processes for step in process.steps]
+        self._monitors = [number for number, each in enumerate(dynamics.processes) if each.object is None]
+        self._behaviors = [number for number, each in enumerate(dynamics.processes) if each.object is not None]
         self._literals = dict(enumerate(literals_of(dynamics.conditions)))
-        self.timed = any(isinstance(step, Wait) and step.for_s > 0 for step in steps)
+        self.timed = any(isinstance(step, Arm) for step in steps)
+        self.chooses = any(isinstance(step, Choose) for step in steps)
         self._rests = tuple(map(self._progression.add, formulas))
         self.begin()
 
@@ -145,25 +182,33 @@ class RunMachine:
         """Forget all situations but the first."""
         for known in (self.situations, self._numbers, self._known, self._ways):
             known.clear()
-        self._situation(frozenset((_Mode(self._rests, ((0, 0),) * len(self.dynamics.monitors)),)))
+        self._situation(frozenset((_Mode(self._rests, ((0, ()),) * len(self.dynamics.processes)),)))
 
     def advance(
         self, situation: int, values: Mapping[int, int], *, due: bool, here: int = 0, later: _Later | None = None
-    ) -> Advance:
-        """What a sample makes of a situation.
+    ) -> tuple[Advance, ...]:
+        """What a sample makes of a situation, for each way in which the run may choose there.
 
         Args:
             situation: Its number.
             values: The truth value of each atom at the sample.
             due: Whether the time of `terminate after` is over there.
-            here: The place of the sample, where a monitor waits for a time.
+            here: The place of the sample, where a process has a timer.
             later: Places of later samples, there.
         """
         reads = self.situations[situation].reads
         key = situation, tuple([values[atom] for atom in reads]), due, here
         if key not in self._known:
             modes = self.situations[situation].modes
-            self._known[key] = self._advanced(modes, reads, key[1], due=due, here=here, later=later)
+            found: list[Advance] = []
+            stack: list[dict[tuple[int, int], int]] = [{}]
+            while stack:
+                chosen = stack.pop()
+                try:
+                    found.append(self._advanced(modes, reads, key[1], chosen, due=due, here=here, later=later))
+                except _ToChoose as choice:
+                    stack += [{**chosen, choice.step: option} for option in range(choice.count)]
+            self._known[key] = tuple(dict.fromkeys(found))
         return self._known[key]
 
     def _advanced(
@@ -171,6 +216,7 @@ class RunMachine:
         modes: _Modes,
         reads: tuple[int, ...],
         told: tuple[int, ...],
+        chosen: _Choices,
         *,
         due: bool,
         here: int,
@@ -181,7 +227,7 @@ class RunMachine:
         ended: set[_Mode] = set()
         try:
             for mode in modes:
-                for after, over in self._ways_of(mode, told, values, due=due, here=here, later=later):
+                for after, over in self._ways_of(mode, told, values, chosen, due=due, here=here, later=later):
                     (ended if over else going).add(after)
         except Exhausted:
             return Advance(self._undecided())
@@ -196,12 +242,12 @@ class RunMachine:
         )
 
     def _ways_of(
-        self, mode: _Mode, told: tuple[int, ...], values: Mapping[int, int], *, due: bool, here: int,
+        self, mode: _Mode, told: tuple[int, ...], values: Mapping[int, int], chosen: _Choices, *, due: bool, here: int,
         later: _Later | None,
     ) -> tuple[tuple[_Mode, bool], ...]:  # fmt: skip
         """The modes that a sample may lead to from one, each with whether the run is over."""
         key = mode, told, due, here
-        if key not in self._ways:
+        if chosen or key not in self._ways:
             found: set[tuple[_Mode, bool]] = set()
             stack: list[dict[int, bool]] = [{}]
             tried = 0
@@ -211,9 +257,12 @@ class RunMachine:
                 if tried > LIMITS.observation_ways:
                     raise exhausted("observation_ways")
                 try:
-                    found.add(self._step(mode, self._holding(values, assumed), due=due, here=here, later=later))
+                    holds = self._holding(values, assumed)
+                    found.add(self._step(mode, holds, chosen, due=due, here=here, later=later))
                 except _NotObserved as error:
                     stack += [{**assumed, error.atom: True}, {**assumed, error.atom: False}]
+            if chosen:
+                return tuple(found)
             self._ways[key] = tuple(found)
         return self._ways[key]
 
@@ -232,20 +281,71 @@ class RunMachine:
         return holds
 
     def _step(
-        self, mode: _Mode, holds: Callable[[int], bool], *, due: bool, here: int, later: _Later | None
-    ) -> tuple[_Mode, bool]:
+        self, mode: _Mode, holds: Callable[[int], bool], chosen: _Choices, *, due: bool, here: int,
+        later: _Later | None,
+    ) -> tuple[_Mode, bool]:  # fmt: skip
         """The mode after a sample at which everything is known, and whether the run is over."""
         rests = tuple([self._progression.after(rest, holds) for rest in mode.rests])
+        if _REJECTS in mode.places:
+            lost = tuple([_REJECTED if place == _REJECTS else place for place in mode.places])
+            return _Mode(rests, lost), due or any(map(holds, self._before))
         # these stop the monitors before they run
         if due or any(map(holds, self._before)):
             return _Mode(rests, mode.places), True
-        places: list[_Place] = []
+        places = list(mode.places)
         over = False
-        for monitor, place in zip(self.dynamics.monitors, mode.places, strict=True):
-            after, terminates = (place, False) if place[1] > here else _watched(monitor, place, holds, later)
-            places.append(after)
+        for number in self._monitors:
+            places[number], terminates = self._run(number, places[number], holds, chosen, here, later)
             over = over or terminates
-        return _Mode(rests, tuple(places)), over or any(map(holds, self._behind))
+        over = over or any(map(holds, self._behind))
+        # behaviors run one after the other, to the first one that ends the run or loses it
+        for number in () if over else self._behaviors:
+            before = places[number]
+            places[number], over = self._run(number, before, holds, chosen, here, later)
+            if places[number] == _REJECTED != before:
+                places[number] = _REJECTS
+            if over or places[number] == _REJECTS:
+                break
+        return _Mode(rests, tuple(places)), over
+
+    def _run(
+        self, number: int, place: _Place, holds: Callable[[int], bool], chosen: _Choices, here: int,
+        later: _Later | None,
+    ) -> tuple[_Place, bool]:  # fmt: skip
+        """Where a process goes on after a sample, and whether it ends the run."""
+        steps = self.dynamics.processes[number].steps
+        at, timers = place[0], dict(place[1])
+        # who goes through more steps than there are never gets to the next sample
+        for _ in range(len(steps) + 1 if at >= 0 else 0):
+            step = steps[at]
+            match step:
+                case Test():
+                    at = step.then if holds(step.condition.number) else step.otherwise
+                case Goto():
+                    at = step.then
+                case Arm():
+                    due = here + 1 if later is None else later(step.after_s)
+                    timers[step.timer] = max(due, timers.get(step.timer, 0)) if step.extends else due
+                    at = step.then
+                case Due():
+                    at = step.then if timers[step.timer] <= here else step.otherwise
+                case Choose():
+                    if (number, at) not in chosen:
+                        raise _ToChoose((number, at), len(step.options))
+                    at = step.options[chosen[number, at]]
+                case Wait():
+                    # of a timer whose time is over nothing but that is known any more
+                    running = [(timer, timers[timer]) for timer in step.timers if timer in timers]
+                    return (step.then, tuple([(timer, at if at > here else 0) for timer, at in running])), False
+                case Terminate():
+                    return _OVER, True
+                case Reject():
+                    return _REJECTED, False
+                case End():
+                    return _OVER, False
+                case _:
+                    assert_never(step)
+        return place if at < 0 else _REJECTED, False
 
     def _situation(self, modes: _Modes) -> int:
         if modes not in self._numbers:
@@ -275,7 +375,7 @@ class RunMachine:
         for atoms, rest in zip(self._of_formulas, mode.rests, strict=True):
             if any(rest):
                 yield from atoms
-        for steps, place in zip(self._of_monitors, mode.places, strict=True):
+        for steps, place in zip(self._of_processes, mode.places, strict=True):
             if place[0] >= 0:
                 yield from steps[place[0]]
 
@@ -288,51 +388,26 @@ class RunMachine:
         number = min(common or {min(each) for each in ways if each} or {-1})
         if number < 0:
             return None
-        said = [*self.dynamics.requirements, *self.dynamics.monitors]
+        said = [*self.dynamics.requirements, *self.dynamics.processes]
         return said[number].span
 
     def _causes(self, mode: _Mode, *, for_good: bool) -> list[int]:
         found = [n for n, rest in enumerate(mode.rests) if rest == LOST or not (for_good or accepts(rest))]
-        return found + [len(mode.rests) + n for n, place in enumerate(mode.places) if place == _REJECTED]
+        rejecting = (_REJECTED, _REJECTS) if for_good else (_REJECTED,)
+        return found + [len(mode.rests) + n for n, place in enumerate(mode.places) if place in rejecting]
 
 
-def _watched(
-    monitor: Monitor, place: _Place, holds: Callable[[int], bool], later: _Later | None
-) -> tuple[_Place, bool]:
-    """Where a monitor goes on after a sample, and whether it ends the run."""
-    number = place[0]
-    while number >= 0:
-        step = monitor.steps[number]
-        match step:
-            case Test():
-                number = step.then if holds(step.condition.number) else step.otherwise
-            case Goto():
-                number = step.then
-            case Wait():
-                return (step.then, 0 if later is None or step.for_s <= 0 else later(step.for_s)), False
-            case Terminate():
-                return _OVER, True
-            case Reject():
-                return _REJECTED, False
-            case End():
-                return _OVER, False
-            case _:
-                assert_never(step)
-    return place, False
-
-
-def _reads(monitor: Monitor) -> list[frozenset[int]]:
-    """The numbers of the atoms that a monitor may read at one sample, by the step at which it goes on."""
+def _reads(process: Process) -> list[frozenset[int]]:
+    """The numbers of the atoms that a process may read at one sample, by the step at which it goes on."""
     found: list[frozenset[int]] = []
-    for first in range(len(monitor.steps)):
+    for first in range(len(process.steps)):
         seen, stack = {first}, [first]
         atoms: set[int] = set()
         while stack:
-            step = monitor.steps[stack.pop()]
+            step = process.steps[stack.pop()]
             if isinstance(step, Test):
                 atoms.add(step.condition.number)
-            after = [step.then, step.otherwise] if isinstance(step, Test) else []
-            after += [step.then] if isinstance(step, Goto) else []
+            after = successors(step)
             new = [each for each in after if each not in seen]
             seen.update(new)
             stack += new

@@ -163,7 +163,7 @@ class RunSteps:
         """For each place the first one from there that leads elsewhere."""
         reads = [each for each in self.machine.situations[number].reads if each in self._of]
         if not reads:
-            stays = Advance(number)
+            stays = (Advance(number),)
             leads = [self.machine.advance(number, row, due=False) != stays for row in self.rows]
             return next_at(np.array(leads, dtype=np.bool_)[self.code])
         assert self.hidden is not None
@@ -186,7 +186,7 @@ class RunSteps:
         for each in told.values():
             code = _told_apart(code, each)
         rows, which = alike(code)
-        stays = Advance(number)
+        stays = (Advance(number),)
         held = [
             self.machine.advance(number, self._row(place, told, place), due=False) == stays
             for place in cast("list[int]", rows.tolist())
@@ -259,11 +259,19 @@ class RunSteps:
         kinds = there[on] if self.machine.timed else self.code[there[on]]
         for each in (*told.values(), ahead.due[on] == there[on]):
             kinds = _told_apart(kinds, each)
+        ways: list[tuple[Advance, NDArray[np.int64]]] = []
         for _, chosen in groups(kinds):
             mine = on[chosen]
             here = int(there[mine[0]])
             row, due = self._row(here, told, int(chosen[0])), bool(ahead.due[mine[0]] == here)
-            advance = self._advance(number, row, due=due, here=here)
+            ways += [(each, mine) for each in self._advance(number, row, due=due, here=here)]
+        if self.machine.chooses:
+            # a lane for each way in which a run may choose
+            ways, copied = _apart(ways, m)
+            of, there, first, notes, ahead = (
+                of[copied], there[copied], first[copied], notes.some(copied), ahead.some(copied),
+            )  # fmt: skip
+        for advance, mine in ways:
             self._ends(notes, advance, mine, there[mine])
             if advance.situation is None:
                 continue
@@ -283,7 +291,7 @@ class RunSteps:
         ahead.at = there + 1
         return LaneStep(of, notes, ahead)
 
-    def _advance(self, number: int, row: dict[int, int], *, due: bool, here: int) -> Advance:
+    def _advance(self, number: int, row: dict[int, int], *, due: bool, here: int) -> tuple[Advance, ...]:
         if not self.machine.timed:
             return self.machine.advance(number, row, due=due)
         return self.machine.advance(number, row, due=due, here=here, later=partial(self._later, here))
@@ -339,6 +347,24 @@ def _told_apart(code: NDArray[np.int64], more: Truth | NDArray[np.bool_]) -> NDA
     if int(code.max(initial=0)) > 1 << 20:
         code = np.unique(code, return_inverse=True)[1].reshape(-1)
     return code * 3 + more
+
+
+def _apart(
+    ways: list[tuple[Advance, NDArray[np.int64]]], count: int
+) -> tuple[list[tuple[Advance, NDArray[np.int64]]], NDArray[np.int64]]:
+    """Ways to go on with lanes of their own each, and the lane that each lane is a copy of."""
+    seen = np.zeros(count, np.bool_)
+    copied = [np.arange(count)]
+    found: list[tuple[Advance, NDArray[np.int64]]] = []
+    for advance, mine in ways:
+        if seen[mine].any():
+            copied.append(mine)
+            found.append((advance, np.arange(count, count + len(mine))))
+            count += len(mine)
+        else:
+            seen[mine] = True
+            found.append((advance, mine))
+    return found, np.concatenate(copied)
 
 
 def _at(sides: dict[int, NDArray[np.bool_]], which: NDArray[np.int64]) -> dict[int, NDArray[np.bool_]]:

@@ -14,15 +14,21 @@ from numpy.typing import NDArray
 from scenicq.forest.among import LabelElements
 from scenicq.forest.columns import DEFINED, UNKNOWN, Column, column_of
 from scenicq.forest.ego_frame import PLACE
-from scenicq.forest.nodes import COURSE, RANK, TRACK, WHO, LaneCourse, Value
+from scenicq.forest.nodes import CLOCK, COURSE, PAST, RANK, TRACK, WHO, LaneCourse, Value
 from scenicq.store.classes import Granularity, class_truth
 from scenicq.store.track_block import TrackBlock
 from scenicq.store.tracks import RecordingTracks, TrackKey
 
-__all__ = ["FIXED", "MOVING", "WITH_COLUMNS", "Binding", "BoundSamples", "Observed", "Samples"]
+__all__ = ["FIXED", "MOVING", "WITH_COLUMNS", "Binding", "BoundSamples", "Observed", "Samples", "is_moving"]
 
 MOVING = WHO | {"position", "heading", "velocity", "speed", "angularSpeed", "acceleration", COURSE}
 """Properties that change from sample to sample: where they are not observed, nothing is known of them."""
+
+
+def is_moving(name: str) -> bool:
+    """Whether a property changes from sample to sample, or is one of a sample that is not kept."""
+    return name in MOVING or name == CLOCK or name.startswith(PAST)
+
 
 FIXED = frozenset({"width", "length", "height"})
 """Properties that are the same at each sample."""
@@ -91,6 +97,10 @@ class BoundSamples:
             who = (self.block.id_ranks() if name == RANK else self.block.tracks(np.arange(self.block.size)))[mine]
             # where it is not there, nobody is it
             return (np.where(mine >= 0, who.astype(np.float64), -1.0 if name == TRACK else np.nan),)
+        if name == CLOCK:
+            labels = self._labels()
+            seconds = (self.block.times_us - self.block.times_us[0]) / 1e6
+            return (np.where(labels >= 0, seconds[labels], np.nan),)
 
         def said() -> list[Value]:
             codes, answers = self.block.said()

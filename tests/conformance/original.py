@@ -126,16 +126,17 @@ class Original:
             self._process = self._started()
         return answer
 
-    def replay(self, recordings: list[dict[str, Any]]) -> list[tuple[str, int]]:
+    def replay(self, recordings: list[dict[str, Any]], *, behaviors: bool = False) -> list[tuple[str, int]]:
         """How the scene simulated last fares on recorded states, by `simulate.py`.
 
         Args:
             recordings: Each with its `states` and its `time_step`.
+            behaviors: Whether behaviors run, whose actions do nothing.
 
         Raises:
             SystemExit: The process has ended.
         """
-        return [(kind, step) for kind, step in self._ask({"replay": recordings})]
+        return [(kind, step) for kind, step in self._ask({"replay": recordings, "behaviors": behaviors})]
 
     def at_points(self, count: int, seed: int) -> list[dict[str, Any]]:
         """What the network says at random points, see `map_answers`.

@@ -8,9 +8,10 @@ Writes OUT/map.geojson as `draw_scenes.py` does, then answers requests, one JSON
 - {"text" or "file", "seed", "seconds", "steps"} compiles and simulates a program. The answer is its trace: what is
   known of the objects, their states at each step (x, y, heading, velocity), and how it ended; or an error, and whether
   a simulation may have been interrupted, after which Scenic takes itself to be within one.
-- {"replay": [{"states", "time_step"}, ...]} has Scenic decide, for the scene simulated last, whether the program holds
-  on given states: nothing acts, its behaviors are left out, and objects are where the states say. The answer has one
-  pair for each: "terminated" by the program, "lasts" beyond the states, or "rejected", and the step at which.
+- {"replay": [{"states", "time_step"}, ...], "behaviors"} has Scenic decide, for the scene simulated last, whether the
+  program holds on given states: actions do nothing, its behaviors run or are left out, and objects are where the states
+  say. The answer has one pair for each: "terminated" by the program, "lasts" beyond the states, or "rejected", and the
+  step at which; or "failed", where Scenic does.
 """
 
 from __future__ import annotations
@@ -28,9 +29,10 @@ from draw_scenes import CARLA, INSTALLED, MODE, thing
 from network_features import features_of
 from patience import OutOfPatienceError, patience
 from scenic import scenarioFromFile, scenarioFromString
-from scenic.core.simulators import Simulation, Simulator, TerminationType
+from scenic.core.simulators import Simulator, TerminationType
 from scenic.core.vectors import Vector
 from scenic.domains.driving.roads import Network
+from scenic.domains.driving.simulators import DrivingSimulation
 from scenic.simulators.newtonian.simulator import NewtonianSimulation
 
 WORLD = "simulated_world"
@@ -43,7 +45,7 @@ def state(thing: Any) -> list[float]:
     return [float(each) for each in (thing.x, thing.y, thing.heading, thing.velocity.x, thing.velocity.y)]
 
 
-class Replayed(Simulation):
+class Replayed(DrivingSimulation):
     """A simulation in which objects are where recorded states say."""
 
     def __init__(self, scene: Any, states: list[list[list[float]]], **options: Any) -> None:
@@ -56,6 +58,13 @@ class Replayed(Simulation):
 
     def step(self) -> None:
         """Nothing: states are read by the number of the step."""
+
+    def executeActions(self, allActions: Any) -> None:
+        """Nothing: objects are where the states say."""
+
+    def actionsAreCompatible(self, agent: Any, actions: Any) -> bool:
+        """Any action may be taken."""
+        return True
 
     def getProperties(self, obj: Any, properties: set[str]) -> dict[str, Any]:
         """What is recorded of an object, and what else Scenic asks for as it is."""
@@ -118,18 +127,26 @@ class Simulations:
             "rejected": rejected,
         }
 
-    def replay(self, states: list[list[list[float]]], time_step: float) -> tuple[str, int]:
-        """How the program of the last scene fares on given states, without behaviors."""
-        for each in self._scene.objects:
+    def replay(self, states: list[list[list[float]]], time_step: float, *, behaviors: bool) -> tuple[str, int]:
+        """How the program of the last scene fares on given states, with its behaviors or without them."""
+        for each in self._scene.objects if not behaviors else ():
             each.behavior = None
+        found = self._replayed(states, time_step, len(states) - 1)
+        if behaviors and found[0] == "lasts":
+            # behaviors run after a step is seen, and may end it there
+            later = self._replayed([*states, states[-1]], time_step, len(states))
+            found = later if later == ("terminated", len(states) - 1) else found
+        return found
+
+    def _replayed(self, states: list[list[list[float]]], time_step: float, steps: int) -> tuple[str, int]:
         simulator = Replayer(states)
         try:
             done = simulator.createSimulation(
-                self._scene, maxSteps=len(states) - 1, name="replay", timestep=time_step, enableReplay=False
+                self._scene, maxSteps=steps, name="replay", timestep=time_step, enableReplay=False
             )
         except Exception as error:
             if getattr(error, "simulation", None) is None:
-                raise
+                return f"failed: {type(error).__name__}: {error}", 0
             return "rejected", error.simulation.currentTime
         lasts = done.result.terminationType == TerminationType.timeLimit
         return "lasts" if lasts else "terminated", done.currentTime
@@ -154,7 +171,10 @@ def main(arguments: list[str]) -> None:
     for line in sys.stdin:
         request = json.loads(line)
         if "replay" in request:
-            answer: Any = [simulations.replay(each["states"], each["time_step"]) for each in request["replay"]]
+            answer: Any = [
+                simulations.replay(each["states"], each["time_step"], behaviors=request.get("behaviors", False))
+                for each in request["replay"]
+            ]
         else:
             answer = simulations.simulate(request)
         print(json.dumps(answer), file=answers, flush=True)

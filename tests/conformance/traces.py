@@ -2,10 +2,11 @@
 
 Run by `make conformance-time MAP=Town01.xodr`, or with SCENIC=a checkout for the programs that Scenic's repository
 publishes, on the towns that they name or, where the checkout lacks one, on another. Scenic's Newtonian simulator runs
-each program (`simulate.py`). Its trace is written as a recording, ingested and matched with `--behaviors ignore`: it
-must match from its first sample to its last. So must what is left of it at 2 Hz, and with noise within the tolerance;
-and changed ones (an object late, stopped, aside, turned, or said to be faster, the trace cut) must match if and only if
-Scenic, replaying the same states without behaviors, says that the program holds, and must end where it says.
+each program (`simulate.py`). Its trace is written as a recording, ingested and matched with `--behaviors ignore`, or as
+`--behaviors` says: it must match from its first sample to its last. So must what is left of it at 2 Hz, and with noise
+within the tolerance; and changed ones (an object late, stopped, aside, turned, or said to be faster, the trace cut)
+must match if and only if Scenic, replaying the same states with or without behaviors, whose actions do nothing, says
+that the program holds, and must end where it says.
 """
 
 from __future__ import annotations
@@ -73,7 +74,7 @@ class Row:
 HEADING = f"{'program':<58}{'traces':>7}{'whole':>9}{'thinned':>9}{'jitter':>9}{'changed':>9}{'broken':>8}"
 
 
-def intervals(text: str, dataset: Path) -> dict[str, list[dict[str, Any]]]:
+def intervals(text: str, dataset: Path, behaviors: str) -> dict[str, list[dict[str, Any]]]:
     """The intervals that begin with the first sample, by recording.
 
     Raises:
@@ -81,7 +82,7 @@ def intervals(text: str, dataset: Path) -> dict[str, list[dict[str, Any]]]:
     """
     # other starts are not looked at, which saves most of the time
     begun = f"{text}\nparam {BEGINS} = 1\n"
-    words = ["match", "-", str(dataset), "--behaviors", "ignore", "--intervals", "all", "--exit-zero"]
+    words = ["match", "-", str(dataset), "--behaviors", behaviors, "--intervals", "all", "--exit-zero"]
     words += ["--quiet", "--jobs", "1", "--timeout", "20", "--format", "jsonl"]
     done = CliRunner().invoke(cli, words, input=begun)
     if done.exit_code:
@@ -93,8 +94,10 @@ def intervals(text: str, dataset: Path) -> dict[str, list[dict[str, Any]]]:
     return found
 
 
-def says_when_it_ends(text: str) -> bool:
-    """Whether a program ends by anything but a behavior, which is left out."""
+def says_when_it_ends(text: str, behaviors: str) -> bool:
+    """Whether a program ends, by anything but a behavior where these are left out."""
+    if behaviors != "ignore":
+        return re.search(r"^[^#\n]*\bterminate\b", text, re.MULTILINE) is not None
     in_monitor = False
     for line in text.splitlines():
         if line[:1].strip():
@@ -147,7 +150,7 @@ def judge(
         row.said.append(f"{each.name}: Scenic says {said} of {last}, scenicq {[one[:2] for one in spans]}")
 
 
-def compare(name: str, path: Path, original: Original, work: Path, seeds: int) -> Row:
+def compare(name: str, path: Path, original: Original, work: Path, seeds: int, behaviors: str) -> Row:
     """Simulate a program and match its traces."""
     row = Row(name)
     text = path.read_text(encoding="utf-8")
@@ -157,16 +160,17 @@ def compare(name: str, path: Path, original: Original, work: Path, seeds: int) -
             row.said.append(f"Scenic says: {trace['error'][:300]}")
             continue
         row.traces += 1
-        ends = says_when_it_ends(text)
+        ends = says_when_it_ends(text, behaviors)
         if ends and trace["end"] == "timeLimit":
             row.said.append("the simulation was not over in time")
         recorded = list(recordings(trace, seed))
-        said = original.replay([{"states": each.states, "time_step": each.time_step} for each in recorded])
+        states = [{"states": each.states, "time_step": each.time_step} for each in recorded]
+        said = original.replay(states, behaviors=behaviors != "ignore")
         folder = work / "recordings"
         write(folder, original.map, trace["objects"], recorded)
         ingest(folder, work / "dataset", force=True)
         try:
-            found = intervals(text, work / "dataset")
+            found = intervals(text, work / "dataset", behaviors)
         except ValueError as error:
             row.said.append(f"refused: {str(error)[:300]}")
             return row
@@ -175,6 +179,9 @@ def compare(name: str, path: Path, original: Original, work: Path, seeds: int) -
         if expected_end(said[0], open_ended=not ends) != last and trace["end"] != "terminatedByBehavior":
             row.said.append(f"whole: replayed, Scenic says {said[0]} of {last}")
         for each, verdict in zip(recorded, said, strict=True):
+            if verdict[0].startswith("failed"):
+                row.said.append(f"{each.name}: Scenic {verdict[0]}")
+                continue
             judge(row, each, verdict, found.get(each.name, []), text=text, ends=ends)
     return row
 
@@ -206,6 +213,9 @@ def parse_arguments() -> argparse.Namespace:
     parser.add_argument("--environment", type=Path, default=Path(".conformance-venv"), help="where Scenic is installed")
     parser.add_argument("--work", type=Path, default=Path(".conformance/traces"), help="folder of maps and recordings")
     parser.add_argument("--seeds", type=int, default=2, help="traces of each program")
+    parser.add_argument(
+        "--behaviors", choices=("ignore", "guards", "motion"), default="ignore", help="as of `scenicq match`"
+    )
     parser.add_argument("--formulas", type=int, default=10_000, help="random temporal formulas to compare with rv_ltl")
     parser.add_argument("--only", default="", metavar="PATTERN", help="programs in whose name this is found")
     return parser.parse_args()
@@ -226,7 +236,7 @@ def main() -> int:
                 continue
             if chart not in originals:
                 originals[chart] = Original(python, chart, arguments.work / chart.stem, "simulate.py")
-            row = compare(name, path, originals[chart], arguments.work, arguments.seeds)
+            row = compare(name, path, originals[chart], arguments.work, arguments.seeds, arguments.behaviors)
             rows.append(row)
             print(row.line(), *(f"    {line}" for line in row.said), sep="\n", flush=True)
     finally:

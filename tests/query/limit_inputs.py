@@ -227,7 +227,7 @@ def told(lines: object) -> Facts:
 
 def compiled(stores: Stores, text: str, **_: object) -> Facts:
     """A program that is compiled."""
-    return told(compile_scenario(Source("p.scenic", HEADER + text), street(), behaviors="refuse") is not None)
+    return told(compile_scenario(Source("p.scenic", HEADER + text), street(), behaviors="guards") is not None)
 
 
 def near_frames(stores: Stores, text: str, **_: object) -> Facts:

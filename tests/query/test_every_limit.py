@@ -55,7 +55,7 @@ REACHED: dict[str, str] = {
     "region_parts": "frames: not visible",
     "random_way_steps": "frames: follow",
     "known_way_steps": "language: known way",
-    "monitor_steps": "time: 1",
+    "process_steps": "time: 1",
     "rounded_nodes": "language: rounded",
     "unobserved_choices": "frames: who is fast",
     "difference_terms": "frames: not visible",

@@ -36,18 +36,22 @@ STATEMENTS = {
     "record initial x": "DynamicStatement(record initial, x)",
     "record final (x)": "DynamicStatement(record final, x)",
     "record x every 2 seconds after 3 steps as 'y z' to 'f'": "DynamicStatement(record, x, y z, [every, after, to])",
-    "do F() until x": "DynamicStatement(do)",
-    "do choose {A(): 1, B(): 2}": "DynamicStatement(do choose)",
-    "do shuffle A(), B()": "DynamicStatement(do shuffle)",
-    "take A(), B()": "DynamicStatement(take)",
+    "do F() until x": "Do([F()], x)",
+    "do F() for 3 * x seconds": "Do([F()], (* 3 x), seconds)",
+    "try:\n  wait\ninterrupt when x:\n  wait\ninterrupt when y:\n  abort": "TryInterrupt("
+    "[DynamicStatement(wait)], [Interrupt(x, [DynamicStatement(wait)]), Interrupt(y, [DynamicStatement(abort)])])",
+    "do choose {A(): 1, B(): 2}": "Do([Dict([DictItem(A(), 1), DictItem(B(), 2)])], choose)",
+    "do shuffle A(), B()": "Do([A(), B()], shuffle)",
+    "take A(), B()": "Take([A(), B()])",
     "wait": "DynamicStatement(wait)",
     "wait for 3 seconds": "DynamicStatement(wait for, 3, seconds)",
     "wait until x": "DynamicStatement(wait until, x)",
     "terminate when x as y": "DynamicStatement(terminate when, x)",
     "abort": "DynamicStatement(abort)",
-    "invoke A()": "DynamicStatement(invoke)",
+    "invoke A()": "Do([A()])",
     "override ego with behavior B(),\n  with x 1": "DynamicStatement(override)",
-    "try:\n  do A()\ninterrupt when x:\n  do B()\nexcept E:\n  abort": "DynamicStatement(try/interrupt)",
+    "try:\n  do A()\ninterrupt when x:\n  do B()\nexcept E:\n  abort": "TryInterrupt([Do([A()])], "
+    "[Interrupt(x, [Do([B()])])], [ExceptHandler(E, [DynamicStatement(abort)])])",
 }
 
 
@@ -78,6 +82,20 @@ def test_definition_of_what_happens_over_time(header: str) -> None:
     assert (first.kind, first.name) == (kind, name)
     assert first.span.text == header
     assert shape(second) == "Assign([after], 1)"
+
+
+def test_bodies_of_behaviors_are_read() -> None:
+    (behavior,) = module(
+        "behavior B(a, b=2):\n  precondition: a > 3\n  invariant: b\n  while True:\n    take A(), B()\n"
+    ).body
+    assert isinstance(behavior, ast.DynamicDefinition)
+    assert shape(behavior.body) == (
+        "[DynamicStatement(precondition, (a > 3)), DynamicStatement(invariant, b), While(True, [Take([A(), B()])])]"
+    )
+
+
+def test_guards_are_names_elsewhere() -> None:
+    assert shape(statement("invariant: int = 3")) == "AnnotatedAssign(invariant, int, 3)"
 
 
 def test_names_of_params_have_places() -> None:

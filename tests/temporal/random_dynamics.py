@@ -12,7 +12,7 @@ from scenicq.forest.temporal import (
     Dynamics,
     End,
     Goto,
-    Monitor,
+    Process,
     Reject,
     TemporalRequirement,
     Terminate,
@@ -24,7 +24,7 @@ from scenicq.forest.temporal import (
 SOURCE = Source("p.scenic", "x" * 100)
 
 
-def random_monitor(draw: random.Random) -> Monitor:
+def random_monitor(draw: random.Random) -> Process:
     """A graph of steps; every circle holds a `Wait`."""
     count = draw.randint(2, 7)
     steps: list[object] = []
@@ -38,7 +38,7 @@ def random_monitor(draw: random.Random) -> Monitor:
                 "reject": Reject(Span(SOURCE, 3, 4)), "again": Wait(0),
             }[kind]
         )  # fmt: skip
-    return Monitor(Span(SOURCE, 50, 51), (*steps, End()))
+    return Process(Span(SOURCE, 50, 51), (*steps, End()))
 
 
 def random_dynamics(draw: random.Random) -> Dynamics:

@@ -29,7 +29,7 @@ def is_possible(formula: tuple) -> bool:
 def code_of(program: str, network: Network) -> str | None:
     """What is wrong with a program."""
     try:
-        compile_scenario(Source("p.scenic", program), network, behaviors="refuse")
+        compile_scenario(Source("p.scenic", program), network, behaviors="guards")
     except ScenarioError as error:
         return error.diagnostics[0].code
     return None

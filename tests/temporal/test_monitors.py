@@ -135,7 +135,7 @@ def test_monitors_do_what_their_text_says(seed: int) -> None:
     draw = random.Random(seed)
     body = bodies(draw, itertools.count(1))
     text = "ego = new Object\nmonitor M():\n" + "\n".join(lines(body)) + "\nrequire monitor M()\n"
-    dynamics = compile_scenario(Source("m.scenic", text), street(), version=3, behaviors="refuse").dynamics
+    dynamics = compile_scenario(Source("m.scenic", text), street(), version=3, behaviors="guards").dynamics
     assert dynamics is not None
     numbers = {}
     for number, condition in enumerate(dynamics.conditions):

@@ -34,7 +34,7 @@ class Definition:
 
     def ends(self, i: int) -> tuple[int | None, bool] | set[int]:
         """The end of the run from i and whether it is a match; of a program without one, every end that is."""
-        places: list[int | None] = [0] * len(self.dynamics.monitors)
+        places: list[int | None] = [0] * len(self.dynamics.processes)
         rejected, found = False, set[int]()
         for k in range(i, len(self.trace)):
             over = False
@@ -43,7 +43,7 @@ class Definition:
                 when = each.condition is not None and not each.simulation and self.trace[k][each.condition.number]
                 over = over or late or when
             if not over:
-                for number, monitor in enumerate(self.dynamics.monitors):
+                for number, monitor in enumerate(self.dynamics.processes):
                     place = places[number]
                     places[number] = None
                     while place is not None:

@@ -47,3 +47,30 @@ def SSSensor(*args, **kwargs):
 
 def RGBSensor(*args, **kwargs):
     return None
+
+# what behaviors ask about the objects of the program
+
+def withinDistanceToAnyCars(car, thresholdDistance):
+    return any([(distance from car to other) < thresholdDistance for other in simulation().objects
+                if other is not car and isinstance(other, Vehicle)])
+
+def withinDistanceToAnyPedestrians(vehicle, thresholdDistance):
+    return any([(vehicle can see other) and (distance from other to front of vehicle) < thresholdDistance
+                for other in simulation().objects if other is not vehicle and isinstance(other, Pedestrian)])
+
+# who is nearer than 0.1 m is taken for the vehicle itself
+def _isWithin(vehicle, other, thresholdDistance):
+    return (vehicle can see other) and 0.1 <= (distance from vehicle.position to other.position) < thresholdDistance
+
+def withinDistanceToAnyObjs(vehicle, thresholdDistance):
+    return any([_isWithin(vehicle, other, thresholdDistance) for other in simulation().objects if other is not vehicle])
+
+def _isOnSameLane(vehicle, other):
+    crossing = network.intersectionAt(vehicle)
+    if crossing:
+        return crossing == network.intersectionAt(other)
+    return network.laneAt(vehicle) == network.laneAt(other)
+
+def withinDistanceToObjsInLane(vehicle, thresholdDistance):
+    return any([_isWithin(vehicle, other, thresholdDistance) and _isOnSameLane(vehicle, other)
+                for other in simulation().objects if other is not vehicle])

@@ -27,7 +27,19 @@ from scenicq.forest.nodes import (
     Node,
 )
 from scenicq.forest.scenario import Scenario
-from scenicq.forest.temporal import And, Atom, Dynamics, Formula, Goto, MonitorStep, Or, Test, Wait, operands
+from scenicq.forest.temporal import (
+    And,
+    Atom,
+    Dynamics,
+    End,
+    Formula,
+    Or,
+    ProcessStep,
+    Reject,
+    Terminate,
+    Test,
+    operands,
+)  # fmt: skip
 from scenicq.forest.value_numbers import ValueNumbers, parts_of
 from scenicq.forest.walk import children, features, is_leaf, leaves, postorder
 from scenicq.match.tolerance import Tolerance
@@ -241,9 +253,12 @@ class _Forms(ValueNumbers):
         for each in dynamics.terminations:
             atom = None if each.condition is None else atoms[each.condition.number]
             said["terminate", atom, each.after_s, each.simulation] += 1
-        for monitor in dynamics.monitors:
-            steps = tuple(_step(step, atoms) for step in monitor.steps)
-            said["monitor", steps] += 1
+        # behaviors run one after the other: where one may end the run before another one loses it, their order counts
+        ordered = any(each.object is not None and each.terminates for each in dynamics.processes)
+        for number, process in enumerate(dynamics.processes):
+            steps = tuple(_step(step, atoms) for step in process.steps)
+            owner = None if process.object is None else swap.get(process.object, process.object)
+            said["process", owner, steps, number if ordered and owner is not None else None] += 1
         return frozenset(said.items())
 
     def _formula(self, root: Formula, atoms: Sequence[int]) -> int:
@@ -262,13 +277,11 @@ class _Forms(ValueNumbers):
         return numbers[id(root)]
 
 
-def _step(step: MonitorStep, atoms: Sequence[int]) -> Hashable:
+def _step(step: ProcessStep, atoms: Sequence[int]) -> Hashable:
     match step:
         case Test():
             return "test", atoms[step.condition.number], step.then, step.otherwise
-        case Goto():
-            return "goto", step.then
-        case Wait():
-            return "wait", step.then, step.for_s
-        case _:
+        case Terminate() | Reject() | End():
             return type(step).__name__
+        case _:
+            return step

@@ -7,7 +7,7 @@ import shutil
 from collections.abc import Mapping
 from typing import Any, Literal, TypedDict, Unpack, get_args
 
-from scenicq.compiler.temporal import Behaviors
+from scenicq.compiler.temporal import REACTION_S, Behaviors
 from scenicq.errors import DataError, Diagnostic, SolverError
 from scenicq.forest.scenario import BuiltIn
 from scenicq.match.options import MatchOptions, Method
@@ -54,7 +54,8 @@ class OptionTexts(TypedDict, total=False):
     initial: bool
     map_defaults: bool
     ignore_params: str | None
-    behaviors: Behaviors | None
+    behaviors: Behaviors
+    reaction: float | str
     min_duration: float | str | None
     intervals: Intervals
     gap: float | str
@@ -84,7 +85,8 @@ KINDS: Mapping[str, OptionKind] = {
     "initial": Flag(),
     "map_defaults": Flag(),
     "ignore_params": Text("names of parameters, separated by commas"),
-    "behaviors": OneOf(("refuse", "ignore")),
+    "behaviors": OneOf(get_args(Behaviors)),
+    "reaction": Amount("s"),
     "min_duration": Amount("s"),
     "intervals": OneOf(get_args(Intervals)),
     "gap": Amount("s", above=True),
@@ -92,7 +94,7 @@ KINDS: Mapping[str, OptionKind] = {
 }
 """What values the options have, by the names of the command line, for the command and for Python."""
 _OPTIONAL = frozenset({
-    "tolerance", "radius", "enforce", "jobs", "limit", "scenic", "ignore_params", "behaviors", "min_duration", "model",
+    "tolerance", "radius", "enforce", "jobs", "limit", "scenic", "ignore_params", "min_duration", "model",
 })  # fmt: skip
 
 
@@ -166,5 +168,7 @@ def read_options(**given: Unpack[OptionTexts]) -> QueryOptions:
     )  # fmt: skip
     values: dict[str, Any] = {name: value for name, value in read.items() if name in same}
     version = None if scenic is None else VERSIONS[scenic]
-    behaviors: Behaviors = read.get("behaviors") or "refuse"
-    return QueryOptions(match=options, version=version, behaviors=behaviors, time=time, **values)
+    return QueryOptions(
+        match=options, version=version, behaviors=read.get("behaviors", "motion"),
+        reaction_s=read.get("reaction", REACTION_S), time=time, **values,
+    )  # fmt: skip

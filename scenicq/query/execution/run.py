@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Literal
 
 from scenicq.compiler.absent import check_enforced
 from scenicq.compiler.program import compile_scenario
-from scenicq.compiler.temporal import Behaviors
+from scenicq.compiler.temporal import REACTION_S, Behaviors
 from scenicq.errors import DataError, Diagnostic, ScenarioError, Source
 from scenicq.forest.scenario import Scenario
 from scenicq.geometry.network import Network
@@ -66,7 +66,8 @@ class QueryOptions:
         limit: Matches after which to stop; None for all.
         every: Whether frames that do not match are results too.
         all_matches: Whether every correspondence of a frame is a result of its own.
-        behaviors: Whether a program with behaviors is refused, or matched over time without them.
+        behaviors: What becomes of the behaviors of a program over time.
+        reaction_s: Seconds that an object has to do what its behavior says, at each change.
         time: Options of intervals.
         model: The world model of a program that imports none.
         strict: Whether what the program sets and no label has is an error.
@@ -88,7 +89,8 @@ class QueryOptions:
     limit: int | None = None
     every: bool = False
     all_matches: bool = False
-    behaviors: Behaviors = "refuse"
+    behaviors: Behaviors = "motion"
+    reaction_s: float = REACTION_S
     time: IntervalOptions = field(default_factory=IntervalOptions)
     model: str | None = None
     strict: bool = False
@@ -160,7 +162,7 @@ class Query:
         try:
             scenario = compile_scenario(
                 self.source, network, version=self.options.version, initial=self.options.initial,
-                behaviors=self.options.behaviors, loader=self.siblings,
+                behaviors=self.options.behaviors, reaction_s=self.options.reaction_s, loader=self.siblings,
                 model=self.options.model, map_defaults=self.options.map_defaults, gap_s=self.options.time.gap_s,
             )  # fmt: skip
             check_enforced(scenario, self.options.match.enforce)

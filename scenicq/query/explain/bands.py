@@ -83,7 +83,7 @@ def bands_of(scenario: Scenario, tracks: RecordingTracks, interval: IntervalVerd
     for termination in dynamics.terminations:
         if termination.condition is not None:
             add(termination.condition.number, " ".join(termination.span.text.split()))
-    for number in dict.fromkeys(s.condition.number for m in dynamics.monitors for s in m.steps if isinstance(s, Test)):
+    for number in dict.fromkeys(s.condition.number for m in dynamics.processes for s in m.steps if isinstance(s, Test)):
         add(number)
     return tuple(found)
 
