@@ -11,7 +11,7 @@ import numpy as np
 from scenicq.errors import Span
 from scenicq.forest.nodes import Compare, Node
 from scenicq.forest.scenario import Scenario
-from scenicq.forest.temporal import Atom, Formula, Test, operands
+from scenicq.forest.temporal import Atom, Formula, Process, Test, operands
 from scenicq.store.tracks import RecordingTracks
 from scenicq.temporal.atoms import AtomColumns, UnclearVariable
 from scenicq.temporal.formula_values import FormulaValues
@@ -83,9 +83,24 @@ def bands_of(scenario: Scenario, tracks: RecordingTracks, interval: IntervalVerd
     for termination in dynamics.terminations:
         if termination.condition is not None:
             add(termination.condition.number, " ".join(termination.span.text.split()))
-    for number in dict.fromkeys(s.condition.number for m in dynamics.processes for s in m.steps if isinstance(s, Test)):
-        add(number)
+    for process in dynamics.processes:
+        who = "" if process.object is None else scenario.objects[process.object].name
+        for number, what in _asked(process, dynamics.conditions, who).items():
+            add(number, what)
     return tuple(found)
+
+
+def _asked(process: Process, conditions: Sequence[Node], who: str) -> dict[int, str]:
+    """The conditions that a process asks, by number, in words: what an object must show, and when that is over."""
+    tests = [step for step in process.steps if isinstance(step, Test)]
+    # whoever shows what it must has time again
+    shown = {each.condition.number for each in tests if getattr(process.steps[each.then], "extends", False)}
+    texts = {each.condition.number: _named(conditions[each.condition.number], each.condition.number) for each in tests}
+    done = {texts[number] for number in shown}
+    return {
+        number: f"{who} shows {text}" if number in shown else f"{who} is through with {text}" if text in done else text
+        for number, text in texts.items()
+    }
 
 
 def _atoms(formula: Formula) -> list[int]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -73,6 +74,20 @@ def test_each_number_of_a_condition_is_told_by_itself(tmp_path, crossroads):
     assert not any("would do" in line for line in lines)
     lines = told(tmp_path, crossroads, program.replace("ego.speed < 5)", "ego.speed < 9)"), "05-two-lane-traffic")
     assert [line for line in lines if "would do" in line] == ["  = `other.speed < 5` would do with 8.003 instead of 5"]
+
+
+def test_what_behaviors_ask_and_what_must_be_shown_is_told_of_whom(tmp_path, crossroads):
+    program = (
+        "behavior Follows():\n    try:\n        do FollowLaneBehavior(target_speed=3)\n"
+        "    interrupt when (distance from self to ego) < 4:\n        take SetBrakeAction(1)\n"
+        "lead = new Car ahead of ego by Range(5, 40), with behavior Follows()\nterminate after 4 seconds\n"
+    )
+    lines = told(tmp_path, crossroads, program, "05-two-lane-traffic")
+    bands = dict(re.split(r"\s{2,}", line) for line in lines if re.search(r"\s{2}[#.?+]+$", line))
+    # it drives at 8 m/s, far from the ego
+    assert set(bands["lead shows FollowLaneBehavior(target_speed=3)"]) == {"."}
+    assert set(bands["(distance from self to ego) < 4"]) == {"."}
+    assert "lead shows SetBrakeAction(1)" in bands
 
 
 def test_two_sides_that_change(tmp_path, crossroads):
