@@ -258,9 +258,10 @@ class _Started:
 
 @dataclass(frozen=True, slots=True)
 class _Waits:
-    """The sample is over."""
+    """The sample is over, and something goes on."""
 
     then: _State
+    activity: Span | None = None
 
 
 Seconds = Callable[["Interpreter", ast.Expression, str, Environment], float]
@@ -372,7 +373,7 @@ class _Graph:
                 return Arm(found.timer, found.after_s, self.placed(found.then), found.extends)
             case _Waits():
                 timers = _timers(found.then.frames) | {timer for _, timer in found.then.modes}
-                return Wait(self.number(found.then), tuple(sorted(timers)))
+                return Wait(self.number(found.then), tuple(sorted(timers)), found.activity)
             case _State():
                 return Goto(self.number(found))
             case _:
@@ -589,7 +590,7 @@ class _Graph:
         body = frame.body if block == len(frame.handlers) else frame.handlers[block]
         return replace(state, frames=(*state.frames[:at], switched, _Block(body)), resumed=-1, asked=-1)
 
-    def waits(self, rest: _State, contracts: Sequence[Contract] = ()) -> _Next:
+    def waits(self, rest: _State, activity: Span | None, contracts: Sequence[Contract] = ()) -> _Next:
         """Go on with a state at the next sample, by when some contracts must be kept."""
         frames = self.aged(rest.frames, "", first=rest.first)
         found: list[tuple[Held, int]] = []
@@ -607,7 +608,8 @@ class _Graph:
             found.append((held, timer))
         modes = tuple(found)
         after: _Next = _Waits(
-            replace(rest, frames=frames, resumed=0, asked=-1, first=False, modes=modes, seen=0 if modes else -1)
+            replace(rest, frames=frames, resumed=0, asked=-1, first=False, modes=modes, seen=0 if modes else -1),
+            activity,
         )
         for timer, after_s in started:
             after = _Started(timer, after_s, after)
@@ -670,13 +672,12 @@ class _Graph:
         contracts, guards = self.contracts_of(frame.call)
         if frame.phase == len(contracts):
             return below
-        contract = contracts[frame.phase]
+        contract, activity = contracts[frame.phase], cast(LibraryCall, frame.call.value).span
         following = self.pushed(below, _Library(frame.call, frame.phase + 1))
         lasting = self.pushed(below, replace(frame, lasted=min(frame.lasted + 1, contract.least_steps)))
-        if contract.over is None or frame.lasted < contract.least_steps:
-            found = self.waits(lasting, (contract,))
-        else:
-            found = self.test(state, contract.over, (), following, self.waits(lasting, (contract,)), self.span)
+        found = self.waits(lasting, activity, (contract,))
+        if contract.over is not None and frame.lasted >= contract.least_steps:
+            found = self.test(state, contract.over, (), following, found, self.span)
         asked = guards if not frame.phase and not frame.lasted else ()
         if asked:
             return _Asked(build.constant(True), asked, found, found, loose=True)
@@ -711,13 +712,13 @@ class _Graph:
             case _Pick():
                 return self.pick(state, node, rest)
             case _Idle():
-                return self.waits(state)
+                return self.waits(state, None)
             case ast.Pass() | ast.ExpressionStatement(value=ast.LiteralValue()):
                 return rest
             case ast.DynamicStatement(kind="precondition" | "invariant"):
                 return rest
             case ast.DynamicStatement(kind="wait"):
-                return self.waits(rest)
+                return self.waits(rest, node.span)
             case ast.Take() if self.agent is not None:
                 return self.take(state, node, rest)
             case ast.DynamicStatement(kind="wait for" | "wait until"):
@@ -816,7 +817,7 @@ class _Graph:
                 contract, guards = self.action(action, node.span)
                 asked += guards
                 contracts += [contract] if contract is not None else []
-            found = self.waits(rest, contracts)
+            found = self.waits(rest, node.span, contracts)
             return _Asked(build.constant(True), tuple(asked), found, found) if asked else found
 
         return self.with_drawn(state, values, node.span, taken)

@@ -163,10 +163,12 @@ class Wait:
     Attributes:
         then: The step.
         timers: The timers that go on; others are forgotten.
+        activity: What goes on meanwhile, in the program: an action, a behavior of the libraries, a `wait`.
     """
 
     then: int
     timers: tuple[int, ...] = ()
+    activity: Span | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -308,11 +308,30 @@ class RunMachine:
                 break
         return _Mode(rests, tuple(places)), over
 
+    def activities(
+        self, situation: int, values: Mapping[int, int], *, here: int = 0, later: _Later | None = None
+    ) -> tuple[Span | None, ...] | None:
+        """What each process does from a sample on, in the program; None where that is not known, or to be chosen.
+
+        Arguments are those of `advance`.
+        """
+        modes = self.situations[situation].modes
+        if len(modes) != 1:
+            return None
+        met: list[Span | None] = []
+        try:
+            for number, place in enumerate(next(iter(modes)).places):
+                met.append(None)
+                self._run(number, place, self._holding(values, {}), {}, here, later, met)
+        except (_NotObserved, _ToChoose):
+            return None
+        return tuple(met)
+
     def _run(
         self, number: int, place: _Place, holds: Callable[[int], bool], chosen: _Choices, here: int,
-        later: _Later | None,
+        later: _Later | None, met: list[Span | None] | None = None,
     ) -> tuple[_Place, bool]:  # fmt: skip
-        """Where a process goes on after a sample, and whether it ends the run."""
+        """Where a process goes on after a sample, and whether it ends the run; what it does last of what is met."""
         steps = self.dynamics.processes[number].steps
         at, timers = place[0], dict(place[1])
         # who goes through more steps than there are never gets to the next sample
@@ -334,6 +353,8 @@ class RunMachine:
                         raise _ToChoose((number, at), len(step.options))
                     at = step.options[chosen[number, at]]
                 case Wait():
+                    if met is not None:
+                        met[-1] = step.activity
                     # of a timer whose time is over nothing but that is known any more
                     running = [(timer, timers[timer]) for timer in step.timers if timer in timers]
                     return (step.then, tuple([(timer, at if at > here else 0) for timer, at in running])), False

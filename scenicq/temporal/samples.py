@@ -216,6 +216,8 @@ class Samples:
     def observed(self, index: int, name: str) -> tuple[Numbers, ...] | list[Value] | None:
         """See `Observed`."""
         track = self.binding[index]
+        if name == CLOCK:
+            return (self.tracks.seconds[self.first : self.end],)
 
         def said() -> list[Value]:
             return [each.get(name) for each in self.tracks.attributes(track)[self.first : self.end]]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -11,15 +12,16 @@ import numpy as np
 from scenicq.errors import Span
 from scenicq.forest.nodes import Compare, Node
 from scenicq.forest.scenario import Scenario
-from scenicq.forest.temporal import Atom, Formula, Process, Test, operands
+from scenicq.forest.temporal import Atom, Dynamics, Formula, Process, Test, operands
 from scenicq.store.tracks import RecordingTracks
+from scenicq.temporal.activities import activities_of
 from scenicq.temporal.atoms import AtomColumns, UnclearVariable
 from scenicq.temporal.formula_values import FormulaValues
 from scenicq.temporal.intervals import IntervalVerdict
 from scenicq.temporal.samples import Samples
 from scenicq.temporal.truth import Truth
 
-__all__ = ["Band", "bands_of", "columns_of", "show_bands"]
+__all__ = ["Band", "bands_of", "columns_of", "show_activities", "show_bands"]
 
 _WIDTH = 60
 """Characters of a band, at most."""
@@ -56,12 +58,7 @@ def bands_of(scenario: Scenario, tracks: RecordingTracks, interval: IntervalVerd
     if dynamics is None:
         return ()
     columns = columns_of(scenario, tracks, interval)
-    known: dict[int, Truth] = {}
-    for number, condition in enumerate(dynamics.conditions):
-        try:
-            known[number] = columns.truth(condition)
-        except UnclearVariable:
-            continue
+    known = _truths(columns, dynamics)
     found: list[Band] = []
 
     def add(number: int, what: str = "") -> None:
@@ -88,6 +85,31 @@ def bands_of(scenario: Scenario, tracks: RecordingTracks, interval: IntervalVerd
         for number, what in _asked(process, dynamics.conditions, who).items():
             add(number, what)
     return tuple(found)
+
+
+def show_activities(scenario: Scenario, tracks: RecordingTracks, interval: IntervalVerdict) -> list[str]:
+    """What behaviors do over an interval, a line for each object."""
+    dynamics = scenario.dynamics
+    if dynamics is None or all(each.object is None for each in dynamics.processes):
+        return []
+    seconds = tracks.seconds[interval.start : interval.end + 1]
+    truths = _truths(columns_of(scenario, tracks, interval), dynamics)
+    lines: dict[int, list[str]] = {}
+    for each in activities_of(dynamics, seconds - seconds[0], truths):
+        # it goes on to the sample at which something else does
+        until = seconds[min(each.end + 1, len(seconds) - 1)]
+        text = _short(" ".join(each.what.text.split()))
+        lines.setdefault(each.object, []).append(f"{text} {seconds[each.start]:.1f}-{until:.1f} s")
+    return [f"{scenario.objects[index].name}: {', '.join(told)}" for index, told in lines.items()]
+
+
+def _truths(columns: AtomColumns, dynamics: Dynamics) -> dict[int, Truth]:
+    """The conditions over the samples by their numbers, without those on hidden random variables."""
+    known: dict[int, Truth] = {}
+    for number, condition in enumerate(dynamics.conditions):
+        with suppress(UnclearVariable):
+            known[number] = columns.truth(condition)
+    return known
 
 
 def _asked(process: Process, conditions: Sequence[Node], who: str) -> dict[int, str]:

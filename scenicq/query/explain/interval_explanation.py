@@ -18,7 +18,7 @@ from scenicq.query.execution.recording_matcher import CUT_OFF
 from scenicq.query.execution.recording_starts import DecidedStart, few_findings, start_table, starts_of
 from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query
-from scenicq.query.explain.bands import Band, bands_of, columns_of, show_bands
+from scenicq.query.explain.bands import Band, bands_of, columns_of, show_activities, show_bands
 from scenicq.query.explain.changes import longest_with, shifted
 from scenicq.query.explain.frame_explanation import explain, show_explanation
 from scenicq.query.explain.interval_changes import Shift, least_changes
@@ -50,6 +50,7 @@ class IntervalExplanation:
         interval: The match, else what came furthest; None where no frame matches the initial scene.
         roles: The track of each object.
         bands: Over the interval.
+        activities: What behaviors do from when to when, a line for each object.
         changes: What one number of the program would have to be for the recording to match; each was tried.
         failed: What frames failed at that do not match the initial scene.
         example: One of the frames that failed at what the fewest did.
@@ -61,6 +62,7 @@ class IntervalExplanation:
     interval: IntervalVerdict | None
     roles: tuple[tuple[str, str], ...] = ()
     bands: tuple[Band, ...] = ()
+    activities: tuple[str, ...] = ()
     changes: tuple[str, ...] = ()
     failed: Counter[str] | None = None
     example: str = ""
@@ -109,6 +111,8 @@ class IntervalExplanation:
             )
         lines += self._undecided() if not self.matches else ()
         lines += ["", *self._broken(interval)]
+        if self.activities:
+            lines += [*self.activities, ""]
         return "\n".join([*lines, *show_bands(self.bands)]).rstrip()
 
     def _undecided(self) -> list[str]:
@@ -230,7 +234,8 @@ def explain_recording(query: Query, solver: Solver, name: str, begins: int | flo
     changes = tuple(each.text for each in shifts if longest_with(query, name, each) is not None)
     bands = bands_of(scenario, tracks, best)
     least_s = None if dynamic else query.options.time.min_duration_s
-    return IntervalExplanation(tracks, best, roles, bands, changes, undecided=undecided, least_s=least_s)
+    activities = tuple(show_activities(scenario, tracks, best))
+    return IntervalExplanation(tracks, best, roles, bands, activities, changes, undecided=undecided, least_s=least_s)
 
 
 def explain_beginning(query: Query, solver: Solver, label: Label) -> tuple[Verdict, str]:

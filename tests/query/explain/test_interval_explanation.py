@@ -90,6 +90,24 @@ def test_what_behaviors_ask_and_what_must_be_shown_is_told_of_whom(tmp_path, cro
     assert "lead shows SetBrakeAction(1)" in bands
 
 
+def test_what_behaviors_do_from_when_to_when_is_told(tmp_path, crossroads):
+    """The clock counts steps of 0.1 s from where the interval begins; a timer and a condition change what is done."""
+    program = (
+        "behavior Follows():\n    do FollowLaneBehavior(target_speed=8) for 1 seconds\n    try:\n        wait\n        wait\n"
+        "        take SetThrottleAction(0.5)\n        while True:\n            wait\n"
+        "    interrupt when simulation().currentTime > 27:\n        take SetBrakeAction(1)\n"
+        "other = new Car ahead of ego by Range(5, 40), with behavior Follows()\nterminate after 4 seconds\n"
+        "require always other.speed < 3\n"
+    )
+    lines = told(tmp_path, crossroads, program, "05-two-lane-traffic")
+    (done,) = [line for line in lines if line.startswith("other: ")]
+    # samples are half a second apart
+    assert done == (
+        "other: FollowLaneBehavior(target_speed=8) 0.0-1.0 s, wait 1.0-1.5 s, wait 1.5-2.0 s, "
+        "take SetThrottleAction(0.5) 2.0-2.5 s, wait 2.5-3.0 s, take SetBrakeAction(1) 3.0-4.0 s"
+    )
+
+
 def test_two_sides_that_change(tmp_path, crossroads):
     program = (
         "leader = new Car\nrequire 0 < ahead(leader) < 60 and abs(to_the_left(leader)) < 1\n"
