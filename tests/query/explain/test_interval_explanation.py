@@ -93,7 +93,8 @@ def test_what_behaviors_ask_and_what_must_be_shown_is_told_of_whom(tmp_path, cro
 def test_what_behaviors_do_from_when_to_when_is_told(tmp_path, crossroads):
     """The clock counts steps of 0.1 s from where the interval begins; a timer and a condition change what is done."""
     program = (
-        "behavior Follows():\n    do FollowLaneBehavior(target_speed=8) for 1 seconds\n    try:\n        wait\n        wait\n"
+        "behavior Follows():\n    do FollowLaneBehavior(target_speed=8) for 1 seconds\n"
+        "    try:\n        wait\n        wait\n"
         "        take SetThrottleAction(0.5)\n        while True:\n            wait\n"
         "    interrupt when simulation().currentTime > 27:\n        take SetBrakeAction(1)\n"
         "other = new Car ahead of ego by Range(5, 40), with behavior Follows()\nterminate after 4 seconds\n"
