@@ -196,15 +196,9 @@ def info(dataset: str, *, verify: bool, named: bool, format_: str) -> None:
     if format_ == "json":
         say(plain_json(opened.manifest.to_json()), nl=False)
     else:
-        fits = map_fits(opened)
+        with opened.blamed():
+            fits = map_fits(opened)
+            lines = [*_lines(opened, fits, named=named)]
         show_few(misfits(fits))
-        say(
-            plain(
-                "\n".join(
-                    [
-                        *_lines(opened, fits, named=named),
-                        *(["every checksum is right, and every value is sound"] if verify else []),
-                    ]
-                )
-            )
-        )
+        lines += ["every checksum is right, and every value is sound"] if verify else []
+        say(plain("\n".join(lines)))
