@@ -62,7 +62,8 @@ def told(
 def test_what_stands_in_for_an_absent_ego_is_not_read(dataset, condition):
     assert {verdict for verdict, _, _ in told(dataset, f"require eventually {condition}")} == {Unknown}
     kept = told(dataset, f"require always not ({condition})")
-    assert (Match, "f0", "f2") in kept
+    # of three samples in a row nobody knows an acceleration
+    assert ((Match, "f0", "f2") in kept) == ("acceleration" not in condition)
     assert all(verdict is not Match or not (first <= "f3" <= last) for verdict, first, last in kept)
 
 
