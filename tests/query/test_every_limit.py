@@ -88,11 +88,9 @@ REACHED: dict[str, str] = {
     "heading_cases": "frames: follow",
     "heading_passes": "frames: figure 6",
     "heading_width": "fields",
-    "field_ways": "frames: badly parked",
     "field_halvings": "frames: follow",
     "shared_values": "fields",
     "shared_width": "fields",
-    "pruned_boxes": "frames: nonlinear",
     "narrowing_passes": "frames: nonlinear",
     "witness_replays": "frames: figure 6",
     "witness_places": "frames: figure 6",
@@ -151,6 +149,8 @@ REACHED: dict[str, str] = {
 }
 """An input that reaches each limit."""
 UNREACHED = {
+    "field_ways": "of parts that a trial has not decided before: none of the inputs of frames since it is asked first",
+    "pruned_boxes": "of groups that a trial leaves open (`tests/match/fields/test_branch_and_prune.py`)",
     "dreal_conjunctions": "dReal is installed nowhere (`tests/smt/test_contract.py` where it is)",
     "solver_memory_mb": "told to a process when it starts (`tests/smt/test_smtlib.py`)",
     "nearer_steps": "of searches beyond `ordered_steps` (`tests/oracle/test_nearest_first.py`)",
