@@ -27,5 +27,7 @@ RUN = "import runpy, sys; sys.path[0] = sys.argv[1]; runpy.run_path(sys.argv[2],
 def test_a_script_finds_what_it_imports(script):
     command = [sys.executable, "-c", RUN, str(script.parent), str(script)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if "missing libraries: libibex.so" in done.stderr:
+        pytest.skip("dReal is installed without libibex.so")
     missing = re.search(r"No module named '(\w+)", done.stderr)
     assert done.returncode == 0 or (missing and missing[1] in ELSEWHERE), done.stderr
