@@ -63,7 +63,7 @@ class Contract:
     """What must be shown in one mode.
 
     Attributes:
-        name: Of the action or behavior, as programs write it.
+        name: The name of the action or behavior, as programs write it.
         shows: A condition about one sample; None where the mode constrains nothing.
         settles_s: Seconds of a window of which some sample must show it; the first begins when the reaction is over.
         over: The mode ends at the first sample at which this holds, also at that of its entry; None: never by itself.
@@ -145,25 +145,18 @@ def _made(
 
 
 def _both(*conditions: Node | None) -> Node:
-    """All of some conditions; those that are None or true are left out."""
-    return _joined(LogicOp.AND, True, conditions)
+    """All of some conditions; those that are None are left out."""
+    return _connected(LogicOp.AND, conditions)
 
 
 def _either(*conditions: Node | None) -> Node:
-    """One of some conditions; those that are None or false are left out."""
-    return _joined(LogicOp.OR, False, conditions)
+    """One of some conditions; those that are None are left out."""
+    return _connected(LogicOp.OR, conditions)
 
 
-def _joined(op: LogicOp, nothing: bool, conditions: Sequence[Node | None]) -> Node:
-    there = [each for each in conditions if each is not None and not _is(each, nothing)]
-    decided = next((each for each in there if _is(each, not nothing)), None)
-    if decided is not None or not there:
-        return build.constant(nothing if decided is None else not nothing)
-    return there[0] if len(there) == 1 else build.logic(op, *there, span=there[0].span)
-
-
-def _is(node: Node, value: bool) -> bool:
-    return isinstance(node, Constant) and node.value is value
+def _connected(op: LogicOp, conditions: Sequence[Node | None]) -> Node:
+    there = [each for each in conditions if each is not None]
+    return build.connect(op, there, next((each.span for each in there if each.span is not None), None))
 
 
 def _bound(name: str) -> float:
@@ -495,7 +488,10 @@ def _named(*names: str, **optional: ModelValue) -> inspect.Signature:
 def _set_brake(motion: _Motion, brake: ModelValue) -> Contract:
     strength = motion.number(brake, "brake", 0.0, 1.0)
     released = motion.compare(CompareOp.LE, strength, 0.0)
-    return Contract(motion.name, None if _is(released, True) else _either(released, motion.brakes()))
+    return Contract(
+        motion.name,
+        None if isinstance(released, Constant) and released.value is True else _either(released, motion.brakes()),
+    )
 
 
 def _set_reverse(motion: _Motion, reverse: ModelValue) -> Contract:

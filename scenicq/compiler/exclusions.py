@@ -7,17 +7,21 @@ choices for which it was found.
 from __future__ import annotations
 
 import re
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
 from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.forest.nodes import Identity, Index, LogicOp, Node, Select
 
-__all__ = ["Exclusions"]
+__all__ = ["Exclusions", "with_exclusions"]
 
+if TYPE_CHECKING:
+    from scenicq.compiler.interpreter import Interpreter
+
+_Result = TypeVar("_Result")
 _Key: TypeAlias = "Identity | int"
 _Told: TypeAlias = "tuple[tuple[tuple[Node, int, int], ...], Node, list[int], int, Span]"
 """What is excluded: under which options of others, the choice, its options, how many it has, and the place."""
@@ -127,6 +131,15 @@ class Exclusions:
     def conditions(self) -> list[tuple[Node, Span]]:
         """That the choices come out as something else, each with the place that needs it."""
         return [(_condition(choice), _with_owner(choice.span)) for choice in self._found.values()]
+
+
+def with_exclusions(run: Interpreter, work: Callable[[], _Result]) -> tuple[_Result, list[tuple[Node, Span]]]:
+    """What is worked out, with what it excludes: the scene as a whole excludes nothing of that."""
+    of_scene, run.excluded = run.excluded, Exclusions()
+    try:
+        return work(), run.excluded.conditions()
+    finally:
+        run.excluded = of_scene
 
 
 def _with_owner(span: Span) -> Span:

@@ -21,7 +21,7 @@ from scenicq.compiler.contracts import Contract, action_contract, behavior_contr
 from scenicq.compiler.coroutines import CoroutineCall, LibraryCall, MonitorDefinition, as_behavior
 from scenicq.compiler.courses import split, without_courses
 from scenicq.compiler.environment import Environment
-from scenicq.compiler.exclusions import Exclusions
+from scenicq.compiler.exclusions import with_exclusions
 from scenicq.compiler.items import items_of
 from scenicq.compiler.local_values import Held, LocalValues
 from scenicq.compiler.logic import condition
@@ -276,7 +276,7 @@ class _Graph:
         run: The interpreter.
         atom: Gives a condition its number.
         agent: Whose behavior it is; None for a monitor.
-        values: Of its variables.
+        values: The values of its variables.
         seconds: Reads times.
         names: What it sees besides the program's names.
         span: Where the program makes it run.
@@ -372,7 +372,7 @@ class _Graph:
             case _Started():
                 return Arm(found.timer, found.after_s, self.placed(found.then), found.extends)
             case _Waits():
-                timers = _timers(found.then.frames) | {timer for _, timer in found.then.modes}
+                timers = _timers_of(found.then)
                 return Wait(self.number(found.then), tuple(sorted(timers)), found.activity)
             case _State():
                 return Goto(self.number(found))
@@ -419,12 +419,8 @@ class _Graph:
 
     def excluding(self, work: Callable[[], _Result]) -> tuple[_Result, _Guards]:
         """What is worked out, with what it excludes."""
-        run = self.run
-        before, run.excluded = run.excluded, Exclusions()
-        try:
-            return work(), tuple(run.excluded.conditions())
-        finally:
-            run.excluded = before
+        found, excluded = with_exclusions(self.run, work)
+        return found, tuple(excluded)
 
     def test(self, state: _State, node: Node, guards: _Guards, then: _Next, otherwise: _Next, span: Span) -> _Next:
         """Go on in one of two ways by a condition, whose random numbers are drawn."""
@@ -457,7 +453,7 @@ class _Graph:
         if names.shared:
             raise self.refused(node.span)
         after = self.with_names(rest, number, names, node.span)
-        return _Asked(build.constant(True), guards, after, after) if guards else after
+        return _guarded(guards, after)
 
     def with_names(self, state: _State, number: int, names: Environment, span: Span) -> _Next:
         """A state with the variables of a call as they are now; random numbers among them are drawn."""
@@ -594,7 +590,7 @@ class _Graph:
         """Go on with a state at the next sample, by when some contracts must be kept."""
         frames = self.aged(rest.frames, "", first=rest.first)
         found: list[tuple[Held, int]] = []
-        used = _timers(rest.frames) | {timer for _, timer in rest.modes}
+        used = _timers_of(rest)
         started: list[tuple[int, float]] = []
         for contract in contracts if self.reaction_s is not None else ():
             if contract.shows is None:
@@ -602,7 +598,7 @@ class _Graph:
             held = self.values.hold_contract(contract)
             timer = dict(rest.modes).get(held)
             if timer is None:
-                timer = next(number for number in range(LIMITS.process_steps) if number not in used)
+                timer = _free_timer(used)
                 used.add(timer)
                 started.append((timer, cast(float, self.reaction_s) + contract.settles_s))
             found.append((held, timer))
@@ -679,8 +675,7 @@ class _Graph:
         if contract.over is not None and frame.lasted >= contract.least_steps:
             found = self.test(state, contract.over, (), following, found, self.span)
         asked = guards if not frame.phase and not frame.lasted else ()
-        if asked:
-            return _Asked(build.constant(True), asked, found, found, loose=True)
+        found = _guarded(asked, found)
         return replace(found, loose=True) if isinstance(found, _Asked) else found
 
     def contracts_of(self, held: Held) -> tuple[tuple[Contract, ...], _Guards]:
@@ -751,7 +746,7 @@ class _Graph:
                 value, guards = self.evaluated(state, node.iterable)
                 items = tuple([self.values.hold(each) for each in items_of(self.run, value, node.iterable.span)])
                 found = self.pushed(rest, _For(node, self.items(items)))
-                return _Asked(build.constant(True), guards, found, found) if guards else found
+                return _guarded(guards, found)
             case ast.Break():
                 frames = self.left(state, node.span, _While, _For).frames
                 return replace(state, frames=frames)
@@ -818,7 +813,7 @@ class _Graph:
                 asked += guards
                 contracts += [contract] if contract is not None else []
             found = self.waits(rest, node.span, contracts)
-            return _Asked(build.constant(True), tuple(asked), found, found) if asked else found
+            return _guarded(tuple(asked), found)
 
         return self.with_drawn(state, values, node.span, taken)
 
@@ -876,7 +871,7 @@ class _Graph:
             return self.limited(state, rest, (inner,), node.until, node.duration, node.unit)
 
         after = self.with_drawn(state, values, node.span, done)
-        return _Asked(build.constant(True), tuple(excluded), after, after) if excluded else after
+        return _guarded(tuple(excluded), after)
 
     def limited(
         self, state: _State, rest: _State, body: tuple[_Statement, ...], until: ast.Expression | None,
@@ -893,8 +888,7 @@ class _Graph:
         after_s = self.seconds(self.run, duration, unit, self.scope(state, self.call_of(state)))
         if after_s <= 0:
             return checked
-        used = _timers(checked.frames) | {timer for _, timer in state.modes}
-        timer = next(number for number in range(LIMITS.process_steps) if number not in used)
+        timer = _free_timer(_timers_of(checked))
         frame = _Try((None,), ((),), body, timer, ends=True)
         found = replace(self.pushed(checked, frame), resumed=len(checked.frames), asked=0)
         return _Started(timer, after_s, found)
@@ -967,6 +961,20 @@ class _Graph:
 def _any_of(ways: Sequence[_Next]) -> _Next:
     """Any of some ways."""
     return ways[0] if len(ways) == 1 else _Ways(tuple(ways))
+
+
+def _guarded(guards: _Guards, then: _Next) -> _Next:
+    """What happens next, after what is asked for so that it can."""
+    return _Asked(build.constant(True), guards, then, then) if guards else then
+
+
+def _timers_of(state: _State) -> set[int]:
+    """The timers that a state needs."""
+    return _timers(state.frames) | {timer for _, timer in state.modes}
+
+
+def _free_timer(used: set[int]) -> int:
+    return next(number for number in range(LIMITS.process_steps) if number not in used)
 
 
 def _timers(frames: Sequence[_Frame]) -> set[int]:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Literal, cast
 from scenicq.compiler.coerce import kind_of_model, read_over_time, to_node
 from scenicq.compiler.courses import split
 from scenicq.compiler.environment import Environment
-from scenicq.compiler.exclusions import Exclusions
+from scenicq.compiler.exclusions import with_exclusions
 from scenicq.compiler.requirements import defer_value
 from scenicq.compiler.values import Delayed, ModelValue, describe, fail
 from scenicq.errors import Diagnostic, ScenarioError, Span, plain
@@ -40,7 +40,7 @@ class RecordStatement:
 
     Attributes:
         name: What its value is called.
-        when: Of which samples of an interval the value is wanted.
+        when: Which samples of an interval give the value.
         value: Computes it once the whole program has run.
         span: The statement.
     """
@@ -95,23 +95,18 @@ def _is_vector(value: ModelValue) -> bool:
 def recorded_values(run: Interpreter) -> tuple[RecordedValue, ...]:
     """What the program records, once it has run; warnings say what of it cannot be."""
     found: list[RecordedValue] = []
-    of_scene = run.excluded
     for each in run.records:
-        run.excluded = Exclusions()
         try:
             with read_over_time():
-                value = each.value()
+                value, excluded = with_exclusions(run, each.value)
         except ScenarioError as error:
             for told in error.diagnostics:
                 message = f"`{each.name}` is not recorded: {told.message}"
                 run.ignored.append(replace(told, code="not-recorded", message=message, severity="warning"))
             continue
-        finally:
-            excluded, run.excluded = run.excluded.conditions(), of_scene
         if excluded:
             # the value is none where that is not there, and no scene is excluded
-            parts = [condition for condition, _ in excluded]
-            there = parts[0] if len(parts) == 1 else build.logic(LogicOp.AND, *parts, span=each.span)
+            there = build.connect(LogicOp.AND, [condition for condition, _ in excluded], each.span)
             lacking = Constant(_LACKING, span=each.span)
             value = Select(build.opposite(there), (value, lacking), span=each.span)
         found.append(RecordedValue(each.name, each.when, value, kind_of(value), each.span))

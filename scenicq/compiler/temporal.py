@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 from scenicq.compiler.coerce import read_over_time
 from scenicq.compiler.coroutines import CoroutineCall, as_behavior
-from scenicq.compiler.exclusions import Exclusions
+from scenicq.compiler.exclusions import with_exclusions
 from scenicq.compiler.process_graph import process_of
 from scenicq.compiler.step_times import simulation, step_seconds
 from scenicq.compiler.values import Instance, ModelValue, fail
@@ -135,18 +135,15 @@ class TimedStatements:
         if not self.used:
             return None, []
         run.simulation = simulation(run)
-        always, of_scene = Exclusions(), run.excluded
-        run.excluded = always
         with read_over_time():
-            nodes = [condition() for condition in self._conditions]
-        run.excluded = of_scene
+            nodes, always = with_exclusions(run, lambda: [condition() for condition in self._conditions])
         for requirement in self._requirements:
             if _known(requirement.formula, nodes) is False:
                 raise fail(
                     "impossible-requirement", "no run satisfies this requirement", requirement.span, "always false"
                 )
         requirements, excluded = list(self._requirements), list[tuple[Node, Span]]()
-        for condition, span in always.conditions():
+        for condition, span in always:
             if any(isinstance(node, Feature) and node.current for node in postorder([condition])):
                 requirements.append(TemporalRequirement(Always(Atom(len(nodes))), span))
                 nodes.append(condition)

@@ -321,9 +321,10 @@ class Measure(_Scalar):
 
     Attributes:
         measure: Which.
-        args: Of tracks, the courses of the objects; else position, heading, velocity, width and length of each object.
+        args: The courses of the objects where it is one of tracks; else position, heading, velocity, width and length
+            of each object.
         seconds: Over how long, where that matters.
-        end: Of a measure of tracks as of `CourseCoordinate`.
+        end: Which end is meant of a measure of tracks, as `CourseCoordinate` says.
     """
 
     measure: MeasureName

@@ -85,7 +85,7 @@ class RecordedValue:
 
     Attributes:
         name: What it is called.
-        when: Of an interval, whether the value at each sample is wanted, or that at the first or the last.
+        when: Whether an interval gives the value at each sample, or that at the first or the last.
         value: Its expression.
         kind: "scalar", "boolean", "vector", or "other" for a text.
         span: Where the program says it.

@@ -75,8 +75,8 @@ def measure_tracks(name: MeasureName, courses: tuple[CoursePlace, ...], seconds:
 
     Args:
         name: The measure.
-        courses: Of the objects that it is about, with where on them they are.
-        seconds: Of a course change, over how long.
+        courses: The courses of the objects that it is about, with where on them they are.
+        seconds: How long a course change takes.
     """
     return _MEASURES[name](courses, seconds)
 

@@ -9,7 +9,7 @@ from scenicq.query.execution.interval_frames import frames_of, verdict_at
 from scenicq.query.execution.recorded_columns import show_cell
 from scenicq.query.execution.results import Recorded, RecordedCell, Result
 from scenicq.query.execution.run import Query
-from scenicq.query.explain.bands import Band, bands_of
+from scenicq.query.explain.bands import Band, bands_of, conditions_over
 from scenicq.query.explain.interval_explanation import placed
 from scenicq.report.runs import FrameRun
 from scenicq.report.svg import element, escape
@@ -50,7 +50,8 @@ def _timeline(query: Query, result: Result) -> str:
     """The bands of an interval as a picture, and curves of what the program records."""
     curves = [_curve(name, each.values) for name, each in (result.recorded or {}).items() if each.series]
     scenario, tracks, interval = placed(query, result)
-    return _drawn(() if scenario.dynamics is None else bands_of(scenario, tracks, interval), [*filter(None, curves)])
+    bands = () if scenario.dynamics is None else bands_of(scenario, conditions_over(scenario, tracks, interval))
+    return _drawn(bands, [*filter(None, curves)])
 
 
 def _curve(name: str, values: Sequence[RecordedCell]) -> str:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scenicq.errors import Span
 from scenicq.forest.temporal import Dynamics
 from scenicq.temporal.run_machine import RunMachine
-from scenicq.temporal.runs import SLACK_S
+from scenicq.temporal.runs import later_sample
 from scenicq.temporal.truth import UNKNOWN, Truth
 
 __all__ = ["Activity", "activities_of"]
@@ -41,7 +41,7 @@ def activities_of(
 
     Args:
         dynamics: The program.
-        seconds: Of each sample of a run, ascending.
+        seconds: Times of the samples of a run, ascending.
         truths: What is known of conditions at each sample, by their numbers; the others are unknown.
     """
     machine = RunMachine(dynamics)
@@ -50,7 +50,7 @@ def activities_of(
     for here in range(len(seconds)):
         if situation is None:
             break
-        later = partial(_later, seconds, here)
+        later = partial(later_sample, seconds, here)
         values = {number: int(truths[number][here]) if number in truths else int(UNKNOWN) for number in machine.atoms}
         doing = machine.activities(situation, values, here=here, later=later)
         if doing is None:
@@ -66,8 +66,3 @@ def activities_of(
         ways = machine.advance(situation, values, due=False, here=here, later=later)
         situation = ways[0].situation if len(ways) == 1 else None
     return tuple(each for mine in found.values() for each in mine)
-
-
-def _later(seconds: NDArray[np.float64], here: int, after_s: float) -> int:
-    """The first sample so many seconds after one, and at least the next one."""
-    return max(here + 1, int(np.searchsorted(seconds, float(seconds[here]) + after_s - SLACK_S)))

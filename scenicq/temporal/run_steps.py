@@ -23,7 +23,7 @@ from scenicq.temporal.grouping import alike, groups
 from scenicq.temporal.hidden_conditions import HiddenConditions
 from scenicq.temporal.run_machine import Advance, RunMachine
 from scenicq.temporal.run_notes import Notes
-from scenicq.temporal.runs import SLACK_S
+from scenicq.temporal.runs import SLACK_S, later_sample
 from scenicq.temporal.stretches import Timeline
 from scenicq.temporal.truth import FALSE, TRUE, Truth
 
@@ -299,9 +299,7 @@ class RunSteps:
     def _later(self, here: int, time_s: float) -> int:
         """The first place of a stretch so many seconds after one, and at least the next one."""
         end = int(self.stretches.bounds[np.searchsorted(self.stretches.bounds, here, side="right")])
-        seconds = self.stretches.seconds
-        found = here + int(np.searchsorted(seconds[here:end], float(seconds[here]) + time_s - SLACK_S))
-        return max(found, here + 1)
+        return here + later_sample(self.stretches.seconds[here:end], 0, time_s)
 
     def note(self, notes: Notes, number: int, lanes: NDArray[np.int64], places: Places) -> None:
         """Write down that runs of a program without an end may end at some places, in a situation."""

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scenicq.match.verdict import WitnessValue
 from scenicq.temporal.truth import FALSE, UNKNOWN, Truth
 
-__all__ = ["SLACK_S", "Detail", "Runs"]
+__all__ = ["SLACK_S", "Detail", "Runs", "later_sample"]
 
 SLACK_S = 1e-6
 """Seconds that floating point may be off."""
@@ -24,6 +24,17 @@ Detail = tuple[str, Mapping[str, WitnessValue]]
 """Why a run is unknown, and the values of random variables of conditions over time that prove a match."""
 
 Places = NDArray[np.int64]
+
+
+def later_sample(seconds: NDArray[np.float64], here: int, after_s: float) -> int:
+    """The first sample so many seconds after one of a stretch, and at least the next one.
+
+    Args:
+        seconds: Times of the samples of the stretch, ascending.
+        here: The number of the sample.
+        after_s: Seconds.
+    """
+    return max(here + 1, int(np.searchsorted(seconds, float(seconds[here]) + after_s - SLACK_S)))
 
 
 @dataclass(frozen=True, slots=True)

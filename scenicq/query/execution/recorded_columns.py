@@ -204,7 +204,7 @@ def struct_of_row(told: Mapping[str, Any], kind: pa.DataType) -> dict[str, Any]:
 
     Args:
         told: What is recorded, as plain values.
-        kind: Of `recorded_struct`.
+        kind: The type that `recorded_struct` gives.
     """
     found: dict[str, Any] = {}
     for each in kind:

@@ -72,7 +72,7 @@ class SeriesRecord(Struct, frozen=True):
 
     Attributes:
         first, last: At the first and the last sample.
-        minimum, maximum, mean: Of the samples at which it is a known number; null where there are none.
+        minimum, maximum, mean: Over the samples at which it is a known number; null where there are none.
         values: At each sample.
     """
 
@@ -94,7 +94,7 @@ class FrameRecord(Struct, frozen=True, kw_only=True):
         witness: A value of each random variable that proves a match, a number or a point, by its place in the program.
         cause: What excludes a match, or leaves it open; absent in a match.
         sensors: The sensor file of each channel.
-        recorded: Of a match what the program records, by name; absent where it records nothing.
+        recorded: What the program records of a match, by name; absent where it records nothing.
         unrecorded: Why a recorded value is null, as a count by the reason, by name; absent where none is.
         log_density, log_density_error, log_weight, no_density: How typical the label is, as
             `scenicq.query.execution.results.LogDensity` has it; absent where that was not asked for.

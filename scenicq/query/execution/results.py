@@ -79,7 +79,7 @@ class Result:
         sensors: Path of the sensor file of each channel; empty for frames that the prefilter excluded.
         interval: How far the interval goes on; None for a frame.
         density: How typical it is, where that was asked for.
-        recorded: Of a match what the program records, by name; None where nobody asks for it.
+        recorded: What the program records of a match, by name; None where nobody asks for it.
     """
 
     frame: str
@@ -154,7 +154,7 @@ class Funnel:
             "bindings" that these make, and bindings "cut off" because the recording or a track ends before the program
             does. Matches, unknowns and reasons are then those of intervals.
         broken: Of a query over time: how many bindings without a match broke which requirement.
-        unrecorded: Of each recorded value how often it is null, by the reason: `gap: not observed`.
+        unrecorded: How often each recorded value is null, by the reason: `gap: not observed`.
         missing: Frames of the dataset in which a property that the program sets is missing, although others have it.
         warnings: What the user should know, such as a map that the program does not fit.
         cut: Whether the time was over before all frames were decided.

@@ -33,13 +33,13 @@ from scenicq.query.execution.lazy_solver import LazySolver
 from scenicq.query.execution.run import MAP_LACKS, Query, QueryOptions
 from scenicq.query.explain.changes import (
     Change,
-    as_class,
-    ignoring,
+    change_class,
+    change_tolerance,
+    combine,
+    drop_requirement,
+    ignore_param,
     show_tolerance,
-    together,
-    tolerating,
-    uncompared,
-    without_requirement,
+    skip_property,
 )
 from scenicq.query.explain.prefilter_counts import spots
 from scenicq.query.prefilter.executor import hold, run_plan
@@ -203,7 +203,7 @@ def _lines_meant(scenario: Scenario, about: Set[str]) -> Iterator[str]:
 def _pairs(changes: Sequence[Change], most: int) -> Iterator[Change]:
     """Two changes at once, of the first that drop something."""
     dropping = [each for each in changes if not each.rung]
-    return itertools.starmap(together, itertools.combinations(dropping[:most], 2))
+    return itertools.starmap(combine, itertools.combinations(dropping[:most], 2))
 
 
 def _sample(query: Query, worlds: Mapping[str, CompiledMap], stack: ExitStack, runs: int, maps: int) -> _Sample:
@@ -233,11 +233,11 @@ def _changes(scenario: Scenario, options: MatchOptions) -> Iterator[Change]:
             elif _ATTRIBUTE.fullmatch(text):
                 continue  # no statement says that `ego.lane` must be there, so that none can be dropped
             dropped.setdefault(f"{text} {requirement.span and requirement.span.start}",
-                               without_requirement(requirement, text))  # fmt: skip
+                               drop_requirement(requirement, text))  # fmt: skip
     yield from dropped.values()
     for name, given in scenario.params.items():
         if given.explicit and name not in options.ignore_params:
-            yield ignoring(name, given.span)
+            yield ignore_param(name, given.span)
     numbers: dict[str, None] = {}
     for owner in scenario.objects:
         for name, given in owner.properties.items():
@@ -245,13 +245,13 @@ def _changes(scenario: Scenario, options: MatchOptions) -> Iterator[Change]:
                 what = f"{owner.name}.{name}"
                 span, written = (given.span, "") if given.explicit else (owner.span, _WRITTEN[name])
                 wide = partial(_ruled, owner.name, name, _ANYWHERE[name])
-                yield tolerating(f"`{what}` not compared", wide, about=what, span=span, written=written)
+                yield change_tolerance(f"`{what}` not compared", wide, about=what, span=span, written=written)
             elif given.explicit and name not in _ANYWHERE:
-                yield uncompared(scenario, owner.index, name)
+                yield skip_property(scenario, owner.index, name)
                 if kind_of(given.value) == "scalar":
                     numbers[name] = None
         wider = ancestors(owner.category)[1:2] if is_class(owner.category) else ()
-        yield from (as_class(scenario, owner.index, category) for category in wider)
+        yield from (change_class(scenario, owner.index, category) for category in wider)
     wider_parts = [(name, partial(_ruled, "", name, _WIDER_NUMBER), 1) for name in numbers
                    if options.tolerance.of(0, name).size < _WIDER_NUMBER]  # fmt: skip
     for number, (name, size) in enumerate(_WIDER, 1):
@@ -259,7 +259,7 @@ def _changes(scenario: Scenario, options: MatchOptions) -> Iterator[Change]:
         if disc and getattr(options.tolerance, name) < size:
             wider_parts.append((name, partial(_sized, name, size), number))
     for name, wide, rung in wider_parts:
-        yield tolerating(f"--tolerance {show_tolerance(wide(options.tolerance))}", wide, about=name, rung=rung)
+        yield change_tolerance(f"--tolerance {show_tolerance(wide(options.tolerance))}", wide, about=name, rung=rung)
 
 
 def _ruled(scope: str, name: str, size: float, tolerance: Tolerance) -> Tolerance:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import pairwise
@@ -12,7 +12,7 @@ import numpy as np
 from scenicq.errors import Span
 from scenicq.forest.nodes import Compare, Node
 from scenicq.forest.scenario import Scenario
-from scenicq.forest.temporal import Atom, Dynamics, Formula, Process, Test, operands
+from scenicq.forest.temporal import Atom, Formula, Process, Test, operands
 from scenicq.store.tracks import RecordingTracks
 from scenicq.temporal.activities import activities_of
 from scenicq.temporal.atoms import AtomColumns, UnclearVariable
@@ -21,7 +21,7 @@ from scenicq.temporal.intervals import IntervalVerdict
 from scenicq.temporal.samples import Samples
 from scenicq.temporal.truth import Truth
 
-__all__ = ["Band", "bands_of", "columns_of", "show_activities", "show_bands"]
+__all__ = ["Band", "KnownConditions", "bands_of", "columns_of", "conditions_over", "show_activities", "show_bands"]
 
 _WIDTH = 60
 """Characters of a band, at most."""
@@ -52,13 +52,35 @@ def columns_of(scenario: Scenario, tracks: RecordingTracks, interval: IntervalVe
     return AtomColumns(scenario, samples, start=np.zeros(len(samples), np.int64))
 
 
-def bands_of(scenario: Scenario, tracks: RecordingTracks, interval: IntervalVerdict) -> tuple[Band, ...]:
-    """The conditions and requirements of a program over an interval; those on hidden random variables are left out."""
+@dataclass(frozen=True, slots=True, eq=False)
+class KnownConditions:
+    """The conditions of a program over the samples of an interval.
+
+    Attributes:
+        columns: The samples.
+        truths: What each condition is there, by its number; those on hidden random variables are left out.
+    """
+
+    columns: AtomColumns
+    truths: Mapping[int, Truth]
+
+
+def conditions_over(scenario: Scenario, tracks: RecordingTracks, interval: IntervalVerdict) -> KnownConditions:
+    """The conditions of a program over an interval; there are none in a program about one instant."""
+    columns = columns_of(scenario, tracks, interval)
+    truths: dict[int, Truth] = {}
+    for number, condition in enumerate(() if scenario.dynamics is None else scenario.dynamics.conditions):
+        with suppress(UnclearVariable):
+            truths[number] = columns.truth(condition)
+    return KnownConditions(columns, truths)
+
+
+def bands_of(scenario: Scenario, over: KnownConditions) -> tuple[Band, ...]:
+    """The conditions and requirements of a program over an interval."""
     dynamics = scenario.dynamics
     if dynamics is None:
         return ()
-    columns = columns_of(scenario, tracks, interval)
-    known = _truths(columns, dynamics)
+    columns, known = over.columns, over.truths
     found: list[Band] = []
 
     def add(number: int, what: str = "") -> None:
@@ -87,29 +109,21 @@ def bands_of(scenario: Scenario, tracks: RecordingTracks, interval: IntervalVerd
     return tuple(found)
 
 
-def show_activities(scenario: Scenario, tracks: RecordingTracks, interval: IntervalVerdict) -> list[str]:
+def show_activities(
+    scenario: Scenario, tracks: RecordingTracks, interval: IntervalVerdict, over: KnownConditions
+) -> list[str]:
     """What behaviors do over an interval, a line for each object."""
     dynamics = scenario.dynamics
     if dynamics is None or all(each.object is None for each in dynamics.processes):
         return []
     seconds = tracks.seconds[interval.start : interval.end + 1]
-    truths = _truths(columns_of(scenario, tracks, interval), dynamics)
     lines: dict[int, list[str]] = {}
-    for each in activities_of(dynamics, seconds - seconds[0], truths):
+    for each in activities_of(dynamics, seconds - seconds[0], over.truths):
         # it goes on to the sample at which something else does
         until = seconds[min(each.end + 1, len(seconds) - 1)]
         text = _short(" ".join(each.what.text.split()))
         lines.setdefault(each.object, []).append(f"{text} {seconds[each.start]:.1f}-{until:.1f} s")
     return [f"{scenario.objects[index].name}: {', '.join(told)}" for index, told in lines.items()]
-
-
-def _truths(columns: AtomColumns, dynamics: Dynamics) -> dict[int, Truth]:
-    """The conditions over the samples by their numbers, without those on hidden random variables."""
-    known: dict[int, Truth] = {}
-    for number, condition in enumerate(dynamics.conditions):
-        with suppress(UnclearVariable):
-            known[number] = columns.truth(condition)
-    return known
 
 
 def _asked(process: Process, conditions: Sequence[Node], who: str) -> dict[int, str]:

@@ -27,18 +27,18 @@ __all__ = [
     "LADDER_M",
     "MOST_M",
     "Change",
-    "as_class",
-    "ignoring",
+    "change_class",
+    "change_duration",
+    "change_tolerance",
+    "combine",
+    "drop_requirement",
+    "ignore_param",
     "interval_length",
-    "lasting",
     "least",
     "longest_with",
-    "shifted",
+    "shift_comparison",
     "show_tolerance",
-    "together",
-    "tolerating",
-    "uncompared",
-    "without_requirement",
+    "skip_property",
 ]
 
 MOST_M = 100.0
@@ -119,13 +119,10 @@ def least(
     return high
 
 
-def longest_with(query: Query, recording: str, change: Change) -> Result | None:
-    """The longest interval of a recording that matches with a change; None where none does."""
-    with query.dataset.connect() as connection:
-        found = connection.execute("SELECT map FROM labels WHERE recording = ? LIMIT 1", [recording]).fetchone()
-    assert found is not None
-    compiled, options = change.compiled(query.compiled_map(found[0]), query.options)
-    results = query.alone(recording, found[0], compiled, options).results()
+def longest_with(query: Query, recording: str, map_name: str, change: Change) -> Result | None:
+    """The longest interval of a recording that matches with a change, given its map; None where none does."""
+    compiled, options = change.compiled(query.compiled_map(map_name), query.options)
+    results = query.alone(recording, map_name, compiled, options).results()
     return max((each for each in results if isinstance(each.verdict, Match)), key=interval_length, default=None)
 
 
@@ -142,7 +139,7 @@ def show_tolerance(tolerance: Tolerance) -> str:
     return ",".join(told if told and "=" in items[0] else items)
 
 
-def together(one: Change, other: Change) -> Change:
+def combine(one: Change, other: Change) -> Change:
     """Two changes at once."""
 
     def made(scenario: Scenario, options: QueryOptions) -> tuple[Scenario, QueryOptions]:
@@ -151,7 +148,7 @@ def together(one: Change, other: Change) -> Change:
     return Change(f"{one.text}, and {other.text}", made, about=one.about, both=(one, other))
 
 
-def tolerating(
+def change_tolerance(
     text: str, made: Callable[[Tolerance], Tolerance], *, size: float = math.nan, about: str = "",
     span: Span | None = None, written: str = "", rung: int = 0,
 ) -> Change:  # fmt: skip
@@ -164,7 +161,7 @@ def tolerating(
     return Change(text, with_it, size, about, span, written, rung=rung)
 
 
-def without_requirement(dropped: Requirement, text: str) -> Change:
+def drop_requirement(dropped: Requirement, text: str) -> Change:
     """A requirement dropped, with all that one statement makes of it in the rounds of a loop."""
 
     def made(scenario: Scenario) -> Scenario:
@@ -181,7 +178,7 @@ def _is_said_alike(one: Requirement, other: Requirement) -> bool:
     return one.span == other.span
 
 
-def uncompared(scenario: Scenario, index: int, name: str) -> Change:
+def skip_property(scenario: Scenario, index: int, name: str) -> Change:
     """A property of an object that is not compared."""
     owner = scenario.objects[index]
     what = f"{owner.name}.{name}"
@@ -197,7 +194,7 @@ def uncompared(scenario: Scenario, index: int, name: str) -> Change:
     return Change(f"`{what}` not compared", _of_scenario(made), about=what, span=owner.properties[name].span)
 
 
-def as_class(scenario: Scenario, index: int, category: str) -> Change:
+def change_class(scenario: Scenario, index: int, category: str) -> Change:
     """An object with another class."""
     owner = scenario.objects[index]
 
@@ -209,7 +206,7 @@ def as_class(scenario: Scenario, index: int, category: str) -> Change:
     return Change(f"`{owner.name}` as `{category}`", _of_scenario(made), about=f"{owner.name}.class", span=owner.span)
 
 
-def ignoring(name: str, span: Span | None) -> Change:
+def ignore_param(name: str, span: Span | None) -> Change:
     """A parameter that is not compared."""
 
     def made(scenario: Scenario, options: QueryOptions) -> tuple[Scenario, QueryOptions]:
@@ -219,7 +216,7 @@ def ignoring(name: str, span: Span | None) -> Change:
     return Change(f"--ignore-params {name}", made, about=f"param {name}", span=span)
 
 
-def lasting(seconds: float, size: float) -> Change:
+def change_duration(seconds: float, size: float) -> Change:
     """Another least duration."""
 
     def made(scenario: Scenario, options: QueryOptions) -> tuple[Scenario, QueryOptions]:
@@ -228,7 +225,7 @@ def lasting(seconds: float, size: float) -> Change:
     return Change(f"would match with --min-duration {seconds:g}", made, size, about="--min-duration")
 
 
-def shifted(shift: Shift, span: Span | None) -> Change:
+def shift_comparison(shift: Shift, span: Span | None) -> Change:
     """A comparison over time that lets more or less through."""
 
     def made(scenario: Scenario) -> Scenario:

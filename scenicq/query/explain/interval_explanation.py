@@ -18,8 +18,8 @@ from scenicq.query.execution.recording_matcher import CUT_OFF
 from scenicq.query.execution.recording_starts import DecidedStart, few_findings, start_table, starts_of
 from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query
-from scenicq.query.explain.bands import Band, bands_of, columns_of, show_activities, show_bands
-from scenicq.query.explain.changes import longest_with, shifted
+from scenicq.query.explain.bands import Band, bands_of, columns_of, conditions_over, show_activities, show_bands
+from scenicq.query.explain.changes import longest_with, shift_comparison
 from scenicq.query.explain.frame_explanation import explain, show_explanation
 from scenicq.query.explain.interval_changes import Shift, least_changes
 from scenicq.query.explain.moments import frame_time, intervals_around
@@ -230,11 +230,14 @@ def explain_recording(query: Query, solver: Solver, name: str, begins: int | flo
         return IntervalExplanation(tracks, None, failed=failed, example=example, undecided=undecided)
     best = max(results, key=lambda each: (each.truth, each.cut_off, each.end - each.start))
     roles = tuple((scenario.objects[index].name, track[1] or "ego") for index, track in best.binding)
-    shifts = [shifted(each, best.broken) for each in changes_of(scenario, tracks, best)[: LIMITS.ranked_numbers]]
-    changes = tuple(each.text for each in shifts if longest_with(query, name, each) is not None)
-    bands = bands_of(scenario, tracks, best)
+    shifts = [
+        shift_comparison(each, best.broken) for each in changes_of(scenario, tracks, best)[: LIMITS.ranked_numbers]
+    ]
+    changes = tuple(each.text for each in shifts if longest_with(query, name, labels[0].map, each) is not None)
+    over = conditions_over(scenario, tracks, best)
+    bands = bands_of(scenario, over)
     least_s = None if dynamic else query.options.time.min_duration_s
-    activities = tuple(show_activities(scenario, tracks, best))
+    activities = tuple(show_activities(scenario, tracks, best, over))
     return IntervalExplanation(tracks, best, roles, bands, activities, changes, undecided=undecided, least_s=least_s)
 
 

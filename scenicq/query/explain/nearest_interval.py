@@ -21,13 +21,13 @@ from scenicq.query.execution.run import Query
 from scenicq.query.explain.changes import (
     LADDER_M,
     Change,
+    change_duration,
+    change_tolerance,
     interval_length,
-    lasting,
     least,
     longest_with,
-    shifted,
+    shift_comparison,
     show_tolerance,
-    tolerating,
 )
 from scenicq.query.explain.interval_explanation import changes_of, placed
 from scenicq.query.explain.nearest_miss import tell_cut, widened, with_parts
@@ -116,9 +116,16 @@ def _is_match(result: Result) -> bool:
     return isinstance(result.verdict, Match)
 
 
-def _near(query: Query, recording: str, change: Change) -> _Near | None:
+def _tries(query: Query, recording: str) -> Callable[[Change], Result | None]:
+    """Gives the longest interval of a recording that matches with a change."""
+    with query.dataset.connect() as connection:
+        found = connection.execute("SELECT map FROM labels WHERE recording = ? LIMIT 1", [recording]).fetchone()
+    assert found is not None
+    return partial(longest_with, query, recording, found[0])
+
+
+def _near(found: Result | None, change: Change) -> _Near | None:
     """A recording that a change lets in, with the change as its cause; None where it does not."""
-    found = longest_with(query, recording, change)
     if found is None:
         return None
     assert isinstance(found.verdict, Match)
@@ -136,9 +143,12 @@ def _by_number(query: Query, results: Sequence[Result]) -> _Near | None:
     changes: list[Change] = []
     for result in results:
         scenario, tracks, interval = placed(query, result)
-        changes += [shifted(each, interval.broken) for each in changes_of(scenario, tracks, interval, quick=True)]
+        changes += [
+            shift_comparison(each, interval.broken) for each in changes_of(scenario, tracks, interval, quick=True)
+        ]
     smallest = sorted(changes, key=lambda each: each.size)[: LIMITS.ranked_numbers]
-    tried = (_near(query, results[0].recording, each) for each in smallest)
+    longest = _tries(query, results[0].recording)
+    tried = (_near(longest(each), each) for each in smallest)
     return next((each for each in tried if each is not None), None)
 
 
@@ -153,7 +163,10 @@ def _by_duration(query: Query, result: Result) -> _Near | None:
     if wanted is None or span is None:
         return None
     enough = math.floor((span.end_us - result.timestamp_us) / 1e4) / 100
-    return _near(query, result.recording, lasting(enough, wanted - enough)) if 0 < enough < wanted else None
+    if not 0 < enough < wanted:
+        return None
+    shorter = change_duration(enough, wanted - enough)
+    return _near(_tries(query, result.recording)(shorter), shorter)
 
 
 def _by_tolerance(query: Query, recording: str, enough_m: float, most_m: float) -> _Near | None:
@@ -165,21 +178,25 @@ def _by_tolerance(query: Query, recording: str, enough_m: float, most_m: float) 
         enough_m: Metres of widening under which it does.
         most_m: Metres beyond which it does not matter.
     """
+    longest = _tries(query, recording)
 
-    def matches(widening_m: float) -> bool:
-        return longest_with(query, recording, _wider(query, lambda each: widened(each, widening_m))) is not None
+    def wider(made: Callable[[Tolerance], Tolerance]) -> Change:
+        return change_tolerance(show_tolerance(made(query.options.match.tolerance)), made, about="tolerance")
+
+    def all_wider(widening_m: float) -> Change:
+        return wider(lambda each: widened(each, widening_m))
 
     ladder = [most_m] if most_m < enough_m else [enough_m]
-    size = least(matches, ladder, relative=0.01)
+    size = least(lambda widening_m: longest(all_wider(widening_m)) is not None, ladder, relative=0.01)
     if size is None:
         return None
     # one part alone is better advice
-    parts = [_wider(query, partial(with_parts, parts={part: size})) for part in ("position", "heading")]
-    enough = [each for each in parts if longest_with(query, recording, each) is not None]
-    enough = enough or [_wider(query, lambda each: widened(each, size))]
-    told = f"would match with {' or '.join(each.text for each in enough)}"
-    return _near(query, recording, replace(enough[0], text=told, size=size))
-
-
-def _wider(query: Query, made: Callable[[Tolerance], Tolerance]) -> Change:
-    return tolerating(show_tolerance(made(query.options.match.tolerance)), made, about="tolerance")
+    parts = [wider(partial(with_parts, parts={part: size})) for part in ("position", "heading")]
+    tried = [(longest(each), each) for each in parts]
+    enough = [(found, each) for found, each in tried if found is not None]
+    if not enough:
+        whole = all_wider(size)
+        enough = [(longest(whole), whole)]
+    told = f"would match with {' or '.join(each.text for _, each in enough)}"
+    found, change = enough[0]
+    return _near(found, replace(change, text=told, size=size))
