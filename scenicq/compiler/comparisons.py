@@ -26,6 +26,7 @@ from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.forest.nodes import CompareOp, Constant, Node, Select
 from scenicq.geometry.elements import Maneuver, NetworkElement
+from scenicq.syntax.hints import condition_hint
 
 __all__ = ["binary", "compare", "iterate", "symbolic"]
 
@@ -192,20 +193,10 @@ def _membership(op: str, left: ModelValue, right: ModelValue, span: Span) -> Mod
 def _at_a_side(span: Span) -> tuple[str, ...]:
     """Hints for `in front of` or `is left of`, which are no operators of Scenic's."""
     side = _SIDE.search(span.text)
-    if not side:
-        return ()
-    return (
-        f"`{_PLACED[side[1]]}`, where an object is made, places it there",
-        "`(distance past X) < 0` asks whether X is ahead of the ego, `X can see Y` what is in view",
-    )
+    return (condition_hint(side[1]),) if side else ()
 
 
 _SIDE = re.compile(r"\b(front|back|left|right)\s+of\b")
-_PLACED = {
-    "front": "ahead of X by Range(0, 20)", "back": "behind X by Range(0, 20)",
-    "left": "left of X by Range(0, 5)", "right": "right of X by Range(0, 5)",
-}  # fmt: skip
-"""What places an object at a side of another, by the word for the side."""
 
 
 def _is_special(value: ModelValue) -> bool:

@@ -23,18 +23,29 @@ _DISTANCE = "`(distance from a to b) < 10` compares a distance"
 STANDS, MOVES = "`X.speed < 0.5` asks whether X stands", "`X.speed > 1` asks whether X moves"
 TURNS = "`X.angularSpeed > 0.2` asks whether X turns left, `< -0.2` right"
 BIKE_LANES = "`[each._bikeLane for each in network.laneGroups if each._bikeLane]` are those that the map knows"
-_SIDE = "`(distance past X) < 0` asks whether X is ahead of the ego; `ahead of Y by Range(0, 20)` places a new object"
-_LEFT = "`(distance to X) * sin((angle to X) - ego.heading) > 0` asks whether X is left of the ego, `sin` is of `math`"
+_AHEAD = (
+    "`along(ego, X) > 0` asks whether X is ahead on the ego's course (`from scenicq.labels import along`); "
+    "`ahead of Y by Range(0, 20)` places a new object"
+)
+_BEHIND = _AHEAD.replace("> 0", "< 0").replace("X is ahead", "X is behind").replace("ahead of Y", "behind Y")
+_LEFT = (
+    "`beside(ego, X) > 0` asks whether X is left of the ego's course (`from scenicq.labels import beside`); "
+    "`left of Y by Range(0, 5)` places a new object"
+)
 _RIGHT = _LEFT.replace("> 0", "< 0").replace("left of", "right of")
 _INSIDE = "`X in R` asks whether the box of X lies in a region, `X.position in R` its centre alone"
 _TOWARD = "`abs((angle from X to Y) - X.heading) < 20 deg` asks whether X faces Y; `facing toward Y` turns a new object"
 _SEES = "`X can see Y` asks whether Y is in view"
 _OVER_TIME = "`require (A) until (B)` and `eventually (A and next (eventually B))` say what comes after what"
-_BEYOND = "`beyond X by Range(2, 30)` places a new object where X hides it from the ego"
+_BEYOND = (
+    "`hides(X, Y)` asks whether X hides Y from the ego (`from scenicq.labels import hides`); "
+    "`beyond X by Range(2, 30)` places a new object where X hides it"
+)
 _SAID = {
     "between": "`5 < a < 10` asks whether a number is between two", "near": _DISTANCE, "within": _DISTANCE,
     "close": _DISTANCE, "far": _DISTANCE, "turning": TURNS, "turns": TURNS, "stopped": STANDS, "parked": STANDS,
-    "stationary": STANDS, "standing": STANDS, "ahead": _SIDE, "front": _SIDE, "behind": _SIDE, "left": _LEFT,
+    "stationary": STANDS, "standing": STANDS, "ahead": _AHEAD, "front": _AHEAD, "behind": _BEHIND, "left": _LEFT,
+    "back": _BEHIND,
     "right": _RIGHT, "on": _INSIDE, "inside": _INSIDE, "onto": _INSIDE, "faces": _TOWARD, "facing": _TOWARD,
     "sees": _SEES, "visible": _SEES, "then": _OVER_TIME, "after": _OVER_TIME, "before": _OVER_TIME,
     "overtakes": _OVER_TIME, "passes": _OVER_TIME, "initial": _OVER_TIME, "initially": _OVER_TIME,

@@ -16,20 +16,20 @@ HINTS = {
     "require (angle to other) < 30 degrees": "write `30 deg`",
     "require (distance to other) between 5 and 10": "`5 < a < 10`",
     "require distance between ego and other < 10": "`distance from a to b`",
-    "require other is ahead of ego": "`(distance past X) < 0`",
-    "require other is behind ego": "`(distance past X) < 0`",
-    "require (other is ahead of ego) until (other is behind ego)": "`(distance past X) < 0`",
+    "require other is ahead of ego": "`along(ego, X) > 0`",
+    "require other is behind ego": "`along(ego, X) < 0`",
+    "require (other is ahead of ego) until (other is behind ego)": "`along(ego, X) > 0`",
     "require other is turning left": "`X.angularSpeed > 0.2`",
     "require other is on road": "`X.position in R`",
-    "require other ahead of ego": "`(distance past X) < 0`",
-    "require other left of ego": "sin((angle to X) - ego.heading) > 0`",
-    "require (other right of ego)": "sin((angle to X) - ego.heading) < 0`",
+    "require other ahead of ego": "`along(ego, X) > 0`",
+    "require other left of ego": "`beside(ego, X) > 0`",
+    "require (other right of ego)": "`beside(ego, X) < 0`",
     "require other on crossing": "`X.position in R`",
     "require other facing ego": "`abs((angle from X to Y) - X.heading) < 20 deg`",
     "require other faces ego": "`abs((angle from X to Y) - X.heading) < 20 deg`",
     "require ego sees other": "`X can see Y`",
     "require other.speed > 3 then other.speed < 1": "`require (A) until (B)`",
-    "require other occludes ego": "`beyond X by Range(2, 30)`",
+    "require other occludes ego": "`hides(X, Y)`",
     "new Car left of ego by 1 to 4": "`Range(1, 4)`",
     "new Car left of ego by 1..4": "`Range(1, 4)`",
     "new Car with speed between 5 and 10": "`Range(a, b)`",
@@ -57,9 +57,9 @@ def test_what_to_write(line):
 @pytest.mark.parametrize("line", HINTS)
 def test_what_it_says_to_write_can_be_read(line):
     for text in re.findall("`([^`]+)`", told(line)):
-        specifier = re.match(r"(facing|at|ahead of|beyond|left of|by|with)\b", text)
+        specifier = re.match(r"(facing|at|ahead of|behind|beyond|(left|right) of|by|with)\b", text)
         program = f"new Car left of X {text}" if text.startswith("by") else f"new Car {text}" if specifier else text
-        if not specifier and not program.startswith("require"):
+        if not specifier and not program.startswith(("require", "from")):
             program = f"require {program}"
         if text not in ("deg", "< -0.2"):
             parse(Source("p.scenic", f"ego = new Car\n{program}\n"), 3)

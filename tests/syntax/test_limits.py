@@ -43,6 +43,7 @@ PIECES = {
 
 @pytest.mark.parametrize("kind", MANY)
 @pytest.mark.parametrize("count", [1000, 20_000])
+@pytest.mark.one_in(3)
 def test_endless_operators(kind: str, count: int) -> None:
     message = error(MANY[kind].format(PIECES[kind] * count))
     assert message.startswith("error[budget-exceeded]")
@@ -120,6 +121,7 @@ def test_a_line_takes_few_steps() -> None:
     "piece",
     ["a = 1\n", "[1,", "1 and ", "x < ", "'a' ", "f'{a}' ", "# c\n", "\n", "distance to a < 3 and ", "Car with a 1, "],
 )
+@pytest.mark.one_in(2)
 def test_steps_grow_with_the_length(piece: str) -> None:
     count = 250
     assert calls(piece * count * 8) < 10 * calls(piece * count) + 1000
