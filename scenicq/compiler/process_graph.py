@@ -424,14 +424,13 @@ class _Graph:
 
     def test(self, state: _State, node: Node, guards: _Guards, then: _Next, otherwise: _Next, span: Span) -> _Next:
         """Go on in one of two ways by a condition, whose random numbers are drawn."""
-        if isinstance(node, Constant) and not guards:
-            return then if node.value else otherwise
-        for leaf in self.values.drawn(node):
-            if isinstance(leaf, Index):
-                settled = [cast(Node, each) for each in self.values.each(node, leaf)]
-                return _any_of([self.test(state, each, guards, then, otherwise, span) for each in settled])
-            node = cast(Node, self.values.without(node, leaf, self.unknown(leaf, state, span, ())))
-        return _Asked(node, guards, then, otherwise)
+
+        def tested(settled: ModelValue) -> _Next:
+            if isinstance(settled, Constant) and not guards:
+                return then if settled.value else otherwise
+            return _Asked(cast(Node, settled), guards, then, otherwise)
+
+        return self.with_drawn(state, node, span, tested)
 
     def unknown(self, leaf: Leaf, state: _State, span: Span, targets: tuple[str, ...]) -> Feature:
         """What stands for a number that is drawn and not known."""
@@ -462,19 +461,13 @@ class _Graph:
             if isinstance(value, Function) and value.environment is names:
                 raise fail("unsupported-construct", f"a function inside a {self.word} is not supported", span,
                            "defined here", ("define it at the top level",))  # fmt: skip
-        return self.drawn(state, number, changed, span)
 
-    def drawn(self, state: _State, number: int, names: dict[str, ModelValue], span: Span) -> _Next:
-        """A state with variables of a call, whose random numbers are drawn."""
-        for leaf in self.values.drawn(list(names.values())):
-            if isinstance(leaf, Index):
-                return _any_of([self.drawn(state, number, some, span) for some in self.values.each(names, leaf)])
-            targets = tuple(name for name, value in names.items() if leaf in self.values.drawn(value))
-            put = self.unknown(leaf, state, span, targets)
-            names = {name: self.values.without(value, leaf, put) for name, value in names.items()}
-        frame = cast(_Call, state.frames[number])
-        frames = (*state.frames[:number], _Call(frame.call, self.held(names)), *state.frames[number + 1 :])
-        return replace(state, frames=frames)
+        def assigned(names: ModelValue) -> _Next:
+            call = cast(_Call, state.frames[number]).call
+            frame = _Call(call, self.held(cast("dict[str, ModelValue]", names)))
+            return replace(state, frames=(*state.frames[:number], frame, *state.frames[number + 1 :]))
+
+        return self.with_drawn(state, cast(ModelValue, changed), span, assigned, variables=True)
 
     def held(self, names: Mapping[str, ModelValue]) -> tuple[tuple[str, Held], ...]:
         """Variables in the order of their names."""
@@ -818,14 +811,25 @@ class _Graph:
         return self.with_drawn(state, values, node.span, taken)
 
     def with_drawn(
-        self, state: _State, value: ModelValue, span: Span, following: Callable[[ModelValue], _Next]
-    ) -> _Next:
-        """Go on with a value whose random numbers are drawn."""
+        self, state: _State, value: ModelValue, span: Span, following: Callable[[ModelValue], _Next],
+        *, variables: bool = False,
+    ) -> _Next:  # fmt: skip
+        """Go on with a value whose random numbers are drawn: by each way of a choice, with an unknown for a number.
+
+        Args:
+            state: Where the process stands.
+            value: It.
+            span: The statement that draws.
+            following: How it goes on.
+            variables: Whether it has those that are assigned, which no longer use what stood for an earlier draw.
+        """
         for leaf in self.values.drawn(value):
             if isinstance(leaf, Index):
                 settled = self.values.each(value, leaf)
-                return _any_of([self.with_drawn(state, each, span, following) for each in settled])
-            value = self.values.without(value, leaf, self.unknown(leaf, state, span, ()))
+                return _any_of([self.with_drawn(state, each, span, following, variables=variables) for each in settled])
+            names = cast("dict[str, ModelValue]", value) if variables else {}
+            targets = tuple(name for name, each in names.items() if leaf in self.values.drawn(each))
+            value = self.values.without(value, leaf, self.unknown(leaf, state, span, targets))
         return following(value)
 
     def action(self, value: ModelValue, span: Span) -> tuple[Contract | None, _Guards]:
