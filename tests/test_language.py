@@ -141,6 +141,7 @@ def test_warnings(block: Block) -> None:
 
 
 @pytest.mark.parametrize("block", WARNED, ids=lambda block: f"{block.page}:{block.line}")
+@pytest.mark.one_in(3)
 def test_every_warning_can_be_silenced(block: Block) -> None:
     """A comment in the place of each mark silences the one that it names, and no other."""
     assert warned(replace(block, text=_WARNING.sub(r"# scenicq: ignore[\1]", block.text))) == set()

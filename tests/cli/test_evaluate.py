@@ -39,6 +39,7 @@ def judge(run, parked):
     return call
 
 
+@pytest.mark.slow
 def test_table(judge, parked):
     done = judge("--simulated", parked[0] / "runs.csv")
     assert done.exit_code == 0, done.output
@@ -50,6 +51,7 @@ def test_table(judge, parked):
     assert failures.endswith("the recordings speak for the failure")
 
 
+@pytest.mark.slow
 def test_formats(judge, tmp_path):
     found = json.loads(judge("--format", "json").stdout)
     assert found["scenarios"][0]["roles"][0]["about"] == "role parkedCar"
@@ -94,6 +96,7 @@ def test_ranked_matches(run, parked, tmp_path):
     assert run(*words, "--format", "table").exit_code == 0
 
 
+@pytest.mark.slow
 def test_matches_without_a_density_are_told(run, parked, tmp_path):
     """A square is no density that can be told: in the table and on standard error."""
     program = tmp_path / "square.scenic"
@@ -108,6 +111,7 @@ def test_matches_without_a_density_are_told(run, parked, tmp_path):
     assert all("solved" in each["no_density"] for each in of_lines)
 
 
+@pytest.mark.slow
 def test_a_program_is_matched_with_all_who_can_play_a_role(run, parked, tmp_path):
     source, folder = parked
     words = [folder / "street", "--predictions", source / "predictions.jsonl", "--format", "json"]
@@ -126,6 +130,7 @@ def test_a_program_is_matched_with_all_who_can_play_a_role(run, parked, tmp_path
     assert role["controls"]["frame"] == 0
 
 
+@pytest.mark.slow
 def test_clusters_and_margins(run, judge, tmp_path):
     def role(*words):
         done = judge(*words, "--format", "json")
@@ -163,6 +168,7 @@ def test_from_python(parked):
     assert "missed" in str(matches.evaluate(source / "predictions.jsonl", simulated=source / "runs.csv"))
 
 
+@pytest.mark.slow
 def test_the_table_has_units_and_says_what_the_program_says(run, judge, parked, tmp_path):
     table = judge().stdout
     assert "TRANSLATION (m)" in table

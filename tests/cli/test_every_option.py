@@ -80,6 +80,7 @@ def words(command: click.Command, option: click.Option | None, value: list[str])
 
 
 @pytest.mark.parametrize(("name", "command", "option"), TYPED)
+@pytest.mark.one_in(3)
 def test_a_bad_value_is_one_line_and_nothing_is_done(name, command, option, run, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for text in texts_of(option):
@@ -95,6 +96,7 @@ def test_a_bad_value_is_one_line_and_nothing_is_done(name, command, option, run,
 
 
 @pytest.mark.parametrize(("name", "command", "option"), TYPED)
+@pytest.mark.one_in(3)
 def test_a_bad_value_of_a_variable_is_refused_likewise(name, command, option, run, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     bad = [text for text in texts_of(option) if text.strip()]  # an empty variable is none
@@ -147,6 +149,7 @@ BAD_VALUES: list[Any] = [
 
 
 @pytest.mark.parametrize(("name", "kind"), KINDS.items())
+@pytest.mark.one_in(3)
 def test_python_refuses_what_the_command_refuses(
     name: str, kind: OptionKind, crossroads, scenarios, tmp_path, monkeypatch
 ):

@@ -25,6 +25,7 @@ CASES = {
 
 @pytest.mark.parametrize("form", ["ids", "jsonl", "csv"])
 @pytest.mark.parametrize("case", CASES)
+@pytest.mark.one_in(4)
 def test_a_query_says_how_it_ended(run, crossroads, case, form):
     (program, *options), code = CASES[case]
     done = run("match", "-e", program, crossroads, "--format", form, "-q", *options)
@@ -98,7 +99,7 @@ ENDS: dict[str, tuple[tuple[str, ...], int]] = {
 
 
 @pytest.mark.parametrize("case", ENDS)
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(12)
 def test_the_installed_command_ends_as_the_table_says(installed, crossroads, tmp_path, case):
     words, code = ENDS[case]
     program, *rest = (str(crossroads) if each == "DATASET" else each for each in words)
@@ -126,6 +127,7 @@ EXPLAINED = {
 
 
 @pytest.mark.parametrize("case", EXPLAINED)
+@pytest.mark.one_in(2)
 def test_an_explanation_over_time_ends_as_the_table_says(run, crossroads, case):
     (program, named, *options), code = EXPLAINED[case]
     done = run("explain", "-e", program, crossroads, named, *options)
@@ -138,6 +140,7 @@ def test_an_explanation_over_time_ends_as_the_table_says(run, crossroads, case):
 
 
 @pytest.mark.parametrize("name", ["over time, matched", "over time, nothing", "over time, unknown"])
+@pytest.mark.one_in(3)
 def test_shards_over_time_end_as_the_query(run, crossroads, tmp_path, name):
     (program, _, *options), code = ENDS[name]
     words = ("match", "-e", program, crossroads, *options)

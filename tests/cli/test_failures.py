@@ -72,6 +72,7 @@ def test_too_little_memory_never_means_that_nothing_matched(what, command, cross
 
 @pytest.mark.skipif(sys.platform != "linux", reason="limits of open files are those of Linux")
 @pytest.mark.parametrize("files", [6, 8, 12])
+@pytest.mark.one_in(3)
 def test_too_few_files_never_mean_that_nothing_matched(command, tmp_path, files):
     code = (
         f"import os, resource, sys; resource.setrlimit(resource.RLIMIT_NOFILE, ({files}, {files})); "
@@ -141,7 +142,7 @@ def _limited(limits, words, folder, dataset):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="limits of address space are those of Linux")
 @pytest.mark.parametrize("way", WAYS)
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(8)
 def test_two_gigabytes_of_address_space_are_enough(way, command, crossroads, tmp_path):
     """As README.md says."""
     done = _limited([("RLIMIT_AS", 2 * 10**9)], [command, *WAYS[way]], tmp_path, crossroads)
@@ -153,7 +154,7 @@ def test_two_gigabytes_of_address_space_are_enough(way, command, crossroads, tmp
 @pytest.mark.parametrize(("limit", "most", "letter"), [
     ("RLIMIT_NPROC", 1, "u"), ("RLIMIT_NPROC", 4, "u"), ("RLIMIT_NPROC", 8, "u"), ("RLIMIT_NOFILE", 8, "n"),
 ])  # fmt: skip
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(16)
 def test_what_runs_out_is_named_with_its_limit(limit, most, letter, way, command, crossroads):
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)

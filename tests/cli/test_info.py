@@ -3,6 +3,8 @@
 import json
 import shutil
 
+import pytest
+
 
 def test_it_says_what_there_is(run, crossroads):
     result = run("info", crossroads, "--verify", "--columns")
@@ -57,6 +59,7 @@ def test_json_is_the_manifest(run, crossroads):
     )
 
 
+@pytest.mark.slow
 def test_verify_finds_a_change_that_keeps_the_size(run, crossroads, tmp_path):
     copy = tmp_path / "copy"
     shutil.copytree(crossroads, copy)

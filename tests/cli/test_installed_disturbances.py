@@ -46,6 +46,7 @@ def mirrored(label):
 @pytest.mark.parametrize("way", [("--jobs", "2"), ("--jobs", "1"), ("--jobs", "1", "--resume")])
 @pytest.mark.parametrize("how", ["ingest over it", "swap"])
 @pytest.mark.one_in(24)
+@pytest.mark.slow
 def test_rows_are_of_the_dataset_that_was_asked_about(way, how, command, crossroads, tmp_path):
     """It is replaced at a random moment; results are of the old one, or there are none."""
     other = changed_sample(tmp_path / "other", renamed)
@@ -101,7 +102,7 @@ def test_a_dataset_that_is_removed_meanwhile_is_told_in_one_diagnostic(what, com
 
 @pytest.mark.skipif(sys.platform == "win32", reason="links need rights there")
 @pytest.mark.parametrize("name", NAMES)
-@pytest.mark.one_in(8)
+@pytest.mark.one_in(16)
 def test_nothing_is_written_through_a_link(name, command, crossroads, tmp_path):
     dataset, outside = tmp_path / "d", tmp_path / "outside"
     shutil.copytree(crossroads, dataset)
@@ -117,6 +118,7 @@ def test_nothing_is_written_through_a_link(name, command, crossroads, tmp_path):
         assert {path: path.read_bytes() for path in outside.iterdir()} == before
 
 
+@pytest.mark.slow
 def test_a_mirrored_source_is_told_at_ingest_and_by_info(command, tmp_path):
     source = changed_sample(tmp_path / "source", mirrored)
     made = run(command, "ingest", source, tmp_path / "d")
@@ -142,6 +144,7 @@ def test_what_an_ingest_writes_is_sound(command, tmp_path):
     assert run(command, "info", tmp_path / "d", "--verify").returncode == 0
 
 
+@pytest.mark.slow
 def test_no_solver_command_is_sent_what_few_understand(command, tmp_path):
     seen, source = tmp_path / "seen", changed_sample(tmp_path / "source", lambda label: None)
     lines = (source / "labels.jsonl").read_text().splitlines()

@@ -110,6 +110,7 @@ def test_a_closed_pipe_is_silent(command, crossroads, scenarios, tmp_path):
     "more",
     [["--limit", "1", "--exit-zero"], ["--report", "pages", "--near", "2", "-o", "found.jsonl"], ["--jobs", "2"]],
 )
+@pytest.mark.one_in(3)
 def test_no_library_complains_when_the_process_ends(command, crossroads, scenarios, tmp_path, more):
     """What is kept until the end, such as a connection of DuckDB's, is told of on standard error as leaked."""
     line = [command, "match", str(scenarios / "02_crossing_cars.scenic"), str(crossroads), *more]
@@ -165,6 +166,7 @@ PIPES = {
 
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.one_in(2)
 def test_an_interrupted_ingest_leaves_nothing(command, big_source, tmp_path, number):
     words = [command, "ingest", str(big_source), str(tmp_path / "dataset"), "-q"]
     with subprocess.Popen(words, **PIPES) as process:
@@ -199,6 +201,7 @@ def test_an_interrupted_match_leaves_no_file(command, crossroads, scenarios, tmp
 
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.one_in(2)
 def test_an_interrupted_shard_leaves_no_file(command, crossroads, scenarios, tmp_path, number):
     solver, begun, pieces = tmp_path / "solver.sh", tmp_path / "begun", tmp_path / "pieces"
     solver.write_text(f"touch {begun}\nsleep 60\n")
@@ -231,7 +234,7 @@ def test_an_interrupted_match_without_a_file_says_what_can_be_resumed(command, c
 @pytest.mark.skipif(sys.platform == "win32", reason="process groups and a shell are needed")
 @pytest.mark.parametrize("jobs", ["1", "2"])
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(6)
 def test_no_solver_outlives_a_command_that_ends(command, crossroads, scenarios, tmp_path, number, jobs):
     solver, beats = tmp_path / "solver.sh", tmp_path / "beats"
     solver.write_text(f"while :; do echo >> {beats}; sleep 0.05; done\n")

@@ -108,6 +108,7 @@ def test_formats(run, crossroads, crossing, tmp_path):
         ("--format ids --resume -o OUT", True),
     ],
 )  # fmt: skip
+@pytest.mark.one_in(2)
 def test_of_ids_alone_nobody_reads_proofs(run, crossroads, crossing, tmp_path, monkeypatch, words, read):
     told = []
 
@@ -166,6 +167,7 @@ def test_all_shows_every_frame_with_its_cause(run, crossroads, crossing):
     assert ids == FRAMES
 
 
+@pytest.mark.slow
 def test_two_processes_and_no_prefilter_give_the_same_output(installed, crossroads, crossing, tmp_path):
     plain = installed("match", crossing, crossroads, cwd=tmp_path).stdout
     assert installed("match", crossing, crossroads, "--jobs", "2", cwd=tmp_path).stdout == plain

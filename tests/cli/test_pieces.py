@@ -96,6 +96,7 @@ def files(folder: Path) -> dict[str, bytes]:
     return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
+@pytest.mark.slow
 def test_what_is_gathered_or_resumed_can_be_exported_and_reported(run, program, crossroads, tmp_path):
     given = ("match", program, crossroads, *TOLERANCE)
     plain = run(*given, "--export", "interchange", tmp_path / "a", "-o", tmp_path / "a.jsonl")

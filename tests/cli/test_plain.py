@@ -33,6 +33,7 @@ def test_control_characters_are_shown():
     assert plain("Straße 道路") == "Straße 道路"
 
 
+@pytest.mark.slow
 def test_tables_explanations_and_comparisons(run, evil, scenarios, tmp_path):
     scenario = scenarios / "02_crossing_cars.scenic"
     table = run("match", scenario, evil, "--format", "table", "--limit", "1", "-o", tmp_path / "t", "--summary")

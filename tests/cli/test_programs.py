@@ -68,6 +68,7 @@ def test_every_command_takes_a_program_on_the_command_line(run, crossroads, tmp_
 
 
 @pytest.mark.parametrize("line", ["from math import sin", "import math", "import math as m", "from math import *"])
+@pytest.mark.one_in(2)
 def test_modules_of_python_bring_no_model(run, crossroads, line):
     """The driving model stays for what imports only them, in every command."""
     for command, *others in (

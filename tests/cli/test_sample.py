@@ -28,6 +28,7 @@ def test_drawn_scenes_can_be_ingested_and_all_match(run, scenarios, crossroads, 
         assert len(found.stdout.splitlines()) == 10, found.stderr
 
 
+@pytest.mark.slow
 def test_the_installed_command_draws_what_it_finds_again(installed, scenarios, tmp_path):
     program = scenarios / "04_two_lane_traffic.scenic"
     drawn = installed("sample", program, "-n", 6, "--seed", 3, "-o", "scenes", cwd=tmp_path)

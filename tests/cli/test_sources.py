@@ -53,6 +53,7 @@ def test_whoever_ingests_sees_pictures(run: Callable[..., Any], source: Path, pa
     assert page(tmp_path / "moved") == (True, "")
 
 
+@pytest.mark.slow
 def test_a_dataset_of_somebody_else_opens_no_folder(
     run: Callable[..., Any], source: Path, page: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

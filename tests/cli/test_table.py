@@ -190,6 +190,7 @@ def on_a_terminal(width, *words):
     ids=lambda value: value.stem if isinstance(value, Path) else None,
 )
 @pytest.mark.one_in(4)
+@pytest.mark.slow
 def test_uuids_fit_a_terminal(command, named_by_uuids, program, width, head):
     """With the installed command: no line is wider, every row is shown, and its names are found again."""
     lines = on_a_terminal(width, command, "match", program, named_by_uuids, "--near", "3")
@@ -237,6 +238,7 @@ _NAMED = {
 
 
 @pytest.mark.parametrize("case", _NAMED, ids=" ".join)
+@pytest.mark.one_in(3)
 def test_every_command_takes_beginnings_that_no_other_has(run, crossroads, scenarios, case):
     words, kind = _NAMED[case]
     full, cut, several = {

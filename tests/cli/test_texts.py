@@ -75,6 +75,7 @@ def test_tolerances_in_the_summary(said, golden):
     golden(said(*match) + said(*match, "--tolerance", scoped) + said(*match, "--tolerance", "exact"))
 
 
+@pytest.mark.slow
 def test_separate_minima(said, golden):
     """The least tolerance of a frame; of two conditions what each alone needs, and both together."""
     golden(
@@ -86,6 +87,7 @@ def test_separate_minima(said, golden):
 
 @pytest.mark.parametrize("frame", ["05", "08", "14", "16"])
 @pytest.mark.parametrize("asked", ["position=0.25,heading=5deg", "exact"])
+@pytest.mark.one_in(4)
 def test_the_advised_tolerance_alone_is_enough(said, frame, asked):
     """What `explain` advises for a frame lets it in, of position alone, and a little less does not."""
     told = said("explain", CROSSING, f"03-busy-intersection/{frame}", "--tolerance", asked)
@@ -115,6 +117,7 @@ def test_of_two_parts_that_are_needed_neither_is_wider_than_it_must_be(said):
         assert (f"\n{frame}\n" in found) is enough
 
 
+@pytest.mark.slow
 def test_advice(said, golden):
     """Single changes, two where none helps, and a line that was meant as an area."""
     golden(

@@ -23,7 +23,7 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the folders are
         ({"SCENICQ_STATE": "off", "XDG_STATE_HOME": "{home}/elsewhere"}, None),
     ],
 )
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(6)
 def test_the_state_lies_where_the_readme_says(more, kept, command, tmp_path):
     home = tmp_path / "home"
     home.mkdir()

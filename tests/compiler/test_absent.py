@@ -114,7 +114,7 @@ def outcome(text: str, town: Network) -> str:
 
 
 @pytest.mark.parametrize("name", ASKED)
-@pytest.mark.one_in(9)
+@pytest.mark.one_in(27)
 def test_on_no_map_a_program_is_without_scenes_and_without_a_word(name):
     assert outcome(ASKED[name], network(KINDS)) == "drawn"
     found = {which: outcome(ASKED[name], town) for which, town in MAPS.items()}
@@ -202,6 +202,7 @@ def dataset(tmp_path_factory):
         f"ego = new Car {HERE}\nrequire (eventually ego._lane is not None) and (always ego.position.x < 99)",
     ],
 )
+@pytest.mark.one_in(3)
 def test_frames_of_a_map_that_does_not_do_are_told_and_the_others_found(dataset, text):
     source = Source("p.scenic", f"{HEAD}{text}\n")
     query = Query(dataset, source, QueryOptions(solver="portable"))
@@ -213,6 +214,7 @@ def test_frames_of_a_map_that_does_not_do_are_told_and_the_others_found(dataset,
     assert query.funnel.excluded["map areas"] == 2
 
 
+@pytest.mark.slow
 def test_commands_say_it_before_anything_else(dataset, run, tmp_path):
     file = tmp_path / "p.scenic"
     file.write_text(f"{HEAD}ego = new Car on road\n")

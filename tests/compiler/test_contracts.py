@@ -336,6 +336,7 @@ def differences(condition: Any, tracks: Tracks, wanted: Callable[..., Truth], ag
 
 
 @pytest.mark.parametrize("number", range(len(NAMES)), ids=NAMES)
+@pytest.mark.one_in(3)
 def test_shows_what_the_table_says(number):
     name, agent, args, named, phase, wanted = rows()[number]
     condition = contracts(name, agent, *args, **named)[phase].shows
@@ -348,6 +349,7 @@ def test_shows_what_the_table_says(number):
 
 
 @pytest.mark.parametrize("name", ["FollowLaneBehavior", "LaneChangeBehavior"])
+@pytest.mark.one_in(2)
 def test_lane_of_entry_is_kept(name):
     args = (10,) if name == "FollowLaneBehavior" else (program()[1]["sections"]["west-in-1"],)
     (contract,) = contracts(name, EGO, *args)

@@ -90,6 +90,7 @@ def test_each_distance_matches_with_its_own_number_of_steps(distance: str) -> No
 
 
 @pytest.mark.parametrize("distance", ["base * 2 + 10"])
+@pytest.mark.slow
 def test_another_number_of_steps_does_not_match(distance: str) -> None:
     matcher = Matcher(program(distance))
     for steps in (4, 9):
@@ -128,5 +129,6 @@ def test_a_distance_that_is_likely_too_long_is_refused(distance: str) -> None:
     assert refused.value.diagnostics[0].code == "budget-exceeded"
 
 
+@pytest.mark.slow
 def test_a_distance_that_is_hardly_ever_too_long_is_followed() -> None:
     assert isinstance(Matcher(program("Normal(20, 5)")).match(label(31.0, steps_of(31.0))), Match)

@@ -46,7 +46,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("text", REFUSED)
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(8)
 def test_what_grows_or_takes_too_much_is_refused_where_it_stands(text):
     with pytest.raises(ScenarioError) as caught:
         compile_scenario(Source("p.scenic", HEAD + text), street())

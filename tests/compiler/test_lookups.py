@@ -89,6 +89,7 @@ def drawn(name: str, seed: int) -> Label:
 
 
 @pytest.mark.parametrize("name", PROGRAMS)
+@pytest.mark.one_in(6)
 def test_a_drawn_scene_matches(name: str) -> None:
     matcher = Matcher(scenario(name), MatchOptions(tolerance=EXACT))
     for seed in range(4):

@@ -56,7 +56,7 @@ def test_so_has_what_is_looked_up_where_such_a_part_is(place: str, found: str, e
 @pytest.mark.parametrize("base", ["ego.lane.centerline", "network.lanes[0].centerline", "network.lanes[0].leftEdge"])
 @pytest.mark.parametrize("taken", ["intersection", "CircularRegion((0, 0), 4)", "ego.laneSection"])
 @pytest.mark.parametrize("more", ["", ".intersect(road)", ".difference(sidewalk)"])
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(9)
 def test_lines_that_something_is_taken_off_have_either_heading(base: str, taken: str, more: str) -> None:
     for made, either in ((f"{base}.difference({taken}){more}", True), (f"{base}.intersect(road)", False)):
         nodes = postorder([heading_of_the_last(f"new Car on {made}\n")])

@@ -86,7 +86,7 @@ SAME = {"a is b": True, "a == b": True, "a is not b": False, "a != b": False, "n
 
 
 @pytest.mark.parametrize("condition", SAME)
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(8)
 def test_two_choices_of_many_elements_are_compared(condition: str) -> None:
     """A scene has one of 10^5 outcomes; nested choices and those that share nothing are compared as well."""
     many = "many = [lane for k in range(15) for lane in network.lanes]\n"

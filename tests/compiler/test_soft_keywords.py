@@ -82,7 +82,7 @@ def test_all_soft_keywords_are_recorded_in_all_contexts() -> None:
 
 
 @pytest.mark.parametrize("context", RECORDED["usual"])
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(12)
 def test_a_soft_keyword_is_a_name_where_scenic_takes_it_as_one(context: str) -> None:
     program = conformance().program
     found = {word: outcome(program(context, word)) for word in WORDS if not is_different(word, context)}

@@ -77,7 +77,7 @@ def by_loop(found: Detection, threshold: float, *, nearest_only: bool) -> list[i
 @pytest.mark.parametrize("at_once", [1, 7, 10_000])
 @pytest.mark.parametrize("protocol", [PLAIN, NEAREST])
 @pytest.mark.parametrize("seed", range(3))
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(12)
 def test_the_same_as_a_loop_in_pieces_of_any_size(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, at_once: int, protocol: Protocol, seed: int
 ) -> None:

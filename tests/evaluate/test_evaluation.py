@@ -232,6 +232,7 @@ def test_shares_are_drawn_where_they_are() -> None:
     assert "M25.0 7H25.0" in _whiskers(Share(1, 4, 0.25, (math.nan, math.nan)), None)
 
 
+@pytest.mark.slow
 def test_several_scenarios_are_in_one_table(
     street: Dataset, results: list[Result], predictions: Predictions, tmp_path: Path
 ) -> None:
@@ -249,6 +250,7 @@ def test_several_scenarios_are_in_one_table(
     assert 'id="scenario-1"' in text
 
 
+@pytest.mark.slow
 def test_what_does_not_fit_is_told(street: Dataset, results: list[Result], predictions: Predictions) -> None:
     def run(found: Predictions, **more: Any) -> Callable[[], Evaluation]:
         return lambda: evaluate({"a": results}, street, found, **more)

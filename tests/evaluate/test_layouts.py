@@ -43,6 +43,7 @@ REFUSED = {
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=[pytest.mark.slow] if place % 3 else []) for place, name in enumerate(ALARMED)]
 )
+@pytest.mark.one_in(9)
 def test_layouts_that_gave_false_alarms_give_none(run: Callable[..., Any], tmp_path: Path, name: str) -> None:
     found = judged(run, tmp_path, name, 3, planted=False)
     assert sum(each.worse for each in found) <= 1
@@ -52,6 +53,7 @@ def test_layouts_that_gave_false_alarms_give_none(run: Callable[..., Any], tmp_p
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=[pytest.mark.slow] if place % 2 else []) for place, name in enumerate(REFUSED)]
 )
+@pytest.mark.one_in(3)
 def test_what_is_missing_is_said(run: Callable[..., Any], tmp_path: Path, name: str) -> None:
     (found,) = judged(run, tmp_path, name, 1, planted=True)
     assert found.refused

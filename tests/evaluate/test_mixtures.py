@@ -185,7 +185,7 @@ def close(found: np.ndarray, error: np.ndarray, counts: np.ndarray, size: float,
     assert off.max() <= 0.02 * expected.max(), (off.argmax(), found, expected)
 
 
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(36)
 @pytest.mark.parametrize("gap", NUMBERS)
 def test_densities_of_mixtures(gap: str) -> None:
     values = NUMBERS[gap](np.random.default_rng(5), DRAWS)

@@ -60,6 +60,7 @@ def test_interchange_gives_the_same_tables(name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(not (REAL / "nuscenes-mini").exists(), reason="nuScenes is not on this machine")
+@pytest.mark.slow
 def test_interchange_of_the_real_nuscenes(tmp_path: Path) -> None:
     map_ = REAL / "boston" / "maps" / "boston-seaport.geojson"
     ingest(REAL / "nuscenes-mini", tmp_path / "dataset", maps=[map_])
@@ -251,7 +252,7 @@ def test_openlabel_holds_what_is_known_and_counts_the_rest(tmp_path: Path) -> No
     ids=["long", "3 bytes", "4 bytes", "mixed", "odd"],
 )
 @pytest.mark.parametrize("kind", ["openlabel", "interchange", "paths"])
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(9)
 def test_names_may_be_long(kind: str, name: str, tmp_path: Path) -> None:
     """The name of a file is no longer than systems take, whatever recordings and frames are called."""
     source = Path(shutil.copytree(SAMPLES / "crossroads", tmp_path / "source"))

@@ -146,7 +146,7 @@ def _at(places: dict[tuple[int, str], tuple[np.ndarray, ...]], number: int) -> d
 
 
 @pytest.mark.parametrize("name", [*TERMS, *ANGLES])
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(6)
 def test_quick_forms_tell_what_plain_evaluation_tells(name):
     rng = np.random.default_rng(len(name))
     term = (TERMS | ANGLES)[name]

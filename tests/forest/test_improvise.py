@@ -239,6 +239,7 @@ def test_what_geometry_cannot_make_is_no_scene() -> None:
     assert Improviser(scenario).draw(random.Random(1), 20) is None
 
 
+@pytest.mark.slow
 def test_that_geometry_cannot_tell_what_holds_is_said() -> None:
     text = "area = RectangularRegion((0, 0), 0, 100, 100)\nfor i in range(20):\n"
     text += "    area = area.difference(CircularRegion((2 * i - 20, (i * 7) % 20 - 10), 1.7))\n"

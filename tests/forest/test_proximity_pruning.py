@@ -56,6 +56,7 @@ def around(place, radius):
 
 @pytest.mark.parametrize("radius", [0.8, 3.0, 8.0, 25.0])
 @pytest.mark.parametrize("region", [LINES, AREAS], ids=["lines", "areas"])
+@pytest.mark.one_in(3)
 def test_no_window_holds_more_than_the_limit_which_is_no_idle_one(region, radius):
     window = Window(Constant((0.0, 0.0)), region, radius)
     assert window.total >= mass(region, around((0.0, 0.0), 1e4)) - 1e-6

@@ -9,6 +9,7 @@ from kills import PROGRAM, killed, outcome_after, writers
 
 @pytest.mark.parametrize(("kind", "after_s"), [("index", 0.6), ("sample", 0.8), ("report", 1.0)])
 @pytest.mark.one_in(3)
+@pytest.mark.slow
 def test_the_next_run_comes_to_the_same_end(kind, after_s, run, crossroads, tmp_path):
     environment = {**os.environ, "XDG_STATE_HOME": str(tmp_path / "state")}
     shutil.copytree(crossroads, tmp_path / "copy")

@@ -68,11 +68,13 @@ def has_scenes(text: str, where: Network, waived: frozenset[BuiltIn] = frozenset
 
 
 @pytest.mark.parametrize("name", [*APPENDIX_A, *OTHERS])
+@pytest.mark.one_in(3)
 def test_in_boston(name: str, boston: Network) -> None:
     has_scenes(PROGRAMS[name], boston)
 
 
 @pytest.mark.parametrize("path", FIVE, ids=lambda path: path.stem)
+@pytest.mark.one_in(2)
 def test_the_query_papers_scenarios_in_boston(path: Path, boston: Network) -> None:
     # no one may walk on this map: it has neither sidewalks nor crossings
     waived = frozenset({BuiltIn.CONTAINMENT}) if "pedestrian" in path.stem else frozenset[BuiltIn]()

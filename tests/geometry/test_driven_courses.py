@@ -94,6 +94,7 @@ def _compare(samples: list[Sample], network: Network, lanes: Lanes, draw: random
 
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.one_in(3)
+@pytest.mark.slow
 def test_places_along_random_drives_without_a_map(seed: int) -> None:
     draw, seen = random.Random(seed), Counter[str]()
     for _ in range(20):

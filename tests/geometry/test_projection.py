@@ -23,7 +23,7 @@ def random_region(chance):
 
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("count", [1, 40])
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(4)
 def test_nearest_points_are_those_of_each_place(seed, count):
     chance = random.Random(f"{seed} {count}")
     for _ in range(40):

@@ -95,6 +95,7 @@ def test_cells_cover_the_field(field: RoadDirection, seed: int) -> None:
 
 @settings(max_examples=10, deadline=None, phases=[Phase.explicit, Phase.reuse, Phase.generate])
 @given(fields(), st.integers(0, 2**32))
+@pytest.mark.slow
 def test_guards_say_which_points_of_a_cell_are_meant(field: RoadDirection, seed: int) -> None:
     cells = field.cells((-16.0, -16.0, 16.0, 16.0))
     shapes = [Polygon(cell.polygon) for cell in cells]
@@ -116,6 +117,7 @@ def test_guards_say_which_points_of_a_cell_are_meant(field: RoadDirection, seed:
 
 @settings(max_examples=20, deadline=None, phases=[Phase.explicit, Phase.reuse, Phase.generate])
 @given(fields(), st.integers(0, 2**32))
+@pytest.mark.slow
 def test_half_planes_hold_what_guards_mean(field: RoadDirection, seed: int) -> None:
     rng = np.random.default_rng(seed)
     guarded = [cell for cell in field.cells((-16.0, -16.0, 16.0, 16.0)) if cell.guards]

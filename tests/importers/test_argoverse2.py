@@ -193,6 +193,7 @@ def test_an_unsound_lane_is_left_out(source: Path, tmp_path: Path, edit: Callabl
 
 
 @pytest.mark.skipif(not REAL.exists(), reason="the logs are not on this machine")
+@pytest.mark.slow
 def test_real_vehicles_head_where_they_move_and_along_their_lane(tmp_path: Path) -> None:
     ingest(REAL, tmp_path / "d")
     dataset = open_dataset(tmp_path / "d")

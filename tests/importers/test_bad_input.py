@@ -98,7 +98,7 @@ def place_of(**changes: Any) -> Callable[[dict[str, Any]], object]:
         (lambda label: label.update(sensors={"CAM": 1}), "label", "`CAM` is not a text but a number"),
     ],
 )
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(12)
 def test_an_unsound_record_is_left_out(
     source: Path, tmp_path: Path, change: Callable[[dict[str, Any]], object], what: str, told: str
 ) -> None:
@@ -253,6 +253,7 @@ def test_yaw_is_turned_into_heading(source: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("form", ["split", "shuffled", "gzip", "parquet"])
+@pytest.mark.one_in(2)
 def test_spellings_of_the_labels_give_the_same_dataset(source: Path, tmp_path: Path, form: str) -> None:
     ingest(source, tmp_path / "plain")
     file = source / "labels.jsonl"

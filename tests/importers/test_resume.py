@@ -170,6 +170,7 @@ def test_processes_that_are_killed_are_replaced(
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals")
+@pytest.mark.slow
 def test_a_recording_that_kills_is_named(tmp_path: Path) -> None:
     jobs = [Job(number, (RecordingTask(f"r{number}", "", Deadly()),), str(number)) for number in range(2)]
     (tmp_path / "d").mkdir()
@@ -207,6 +208,7 @@ def killed(source: Path, target: Path, after: int) -> None:
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals")
+@pytest.mark.slow
 def test_finished_recordings_are_not_done_again(source: Path, tmp_path: Path) -> None:
     killed(source, tmp_path / "d", 20)
     summary = ingest(source, tmp_path / "d", segment_objects=SEGMENT)
@@ -219,6 +221,7 @@ def test_finished_recordings_are_not_done_again(source: Path, tmp_path: Path) ->
 @pytest.mark.skipif(os.name != "posix", reason="signals")
 @pytest.mark.parametrize("how", ["force", "other source", "other options"])
 @pytest.mark.one_in(3)
+@pytest.mark.slow
 def test_what_a_killed_ingest_left_is_discarded(source: Path, tmp_path: Path, how: str) -> None:
     killed(source, tmp_path / "d", 20)
     if how == "force":
@@ -233,6 +236,7 @@ def test_what_a_killed_ingest_left_is_discarded(source: Path, tmp_path: Path, ho
     assert len(list(open_dataset(tmp_path / "d").labels())) == summary.frames
 
 
+@pytest.mark.slow
 def test_update_reads_what_is_new_or_has_changed(tmp_path: Path) -> None:
     names = [f"r{number:02}" for number in range(RECORDINGS)]
     source = write_source(tmp_path / "source", names[:-2])
@@ -286,6 +290,7 @@ def test_an_update_reads_recordings_of_a_segment_that_are_new_or_have_changed(
 
 @pytest.mark.parametrize("largest", [15, 60, 10_000])
 @pytest.mark.one_in(3)
+@pytest.mark.slow
 def test_any_row_of_updates_gives_what_a_fresh_ingest_gives(
     largest: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rounds: Callable[[int], int]
 ) -> None:
@@ -366,6 +371,7 @@ def test_an_interrupted_update_changes_nothing(source: Path, tmp_path: Path) -> 
 
 @pytest.mark.parametrize("jobs", [1, 2])
 @pytest.mark.one_in(2)
+@pytest.mark.slow
 def test_a_frame_name_that_two_recordings_use(source: Path, tmp_path: Path, jobs: int) -> None:
     text = (source / "labels.jsonl").read_text()
     (source / "labels.jsonl").write_text(text.replace('"id": "r20/05"', '"id": "r02/07"'))

@@ -101,7 +101,7 @@ def test_what_is_left_out_is_counted_and_nothing_else(
     ("format_", "name"),
     [pytest.param(*case, marks=pytest.mark.slow if case[0] == "opendrive" else ()) for case in CASES],
 )
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(16)
 def test_each_field_is_what_the_list_says(
     format_: str, name: str, tmp_path: Path, opendrive_parsed_here: Callable[[bool], None]
 ) -> None:

@@ -65,6 +65,7 @@ def spread(pairs: list[Any], rounds: Callable[[int], int]) -> list[Any]:
 @pytest.mark.parametrize("columnar", [True, False])
 @pytest.mark.parametrize("alone", [True, False])
 @pytest.mark.one_in(4)
+@pytest.mark.slow
 def test_every_field_of_a_label(tmp_path, monkeypatch, columnar, alone, rounds):
     """Each value in place of each field, in a recording of its own or beside sound labels."""
     if not columnar:

@@ -43,10 +43,12 @@ def verdict(begin: str, step: str, end: str, times: int, timeout_s: float = 60.0
 
 
 @pytest.mark.parametrize("name", EASY)
+@pytest.mark.one_in(2)
 def test_what_is_deep_and_easy_is_decided(name):
     assert isinstance(verdict(*EASY[name]), Match)
 
 
 @pytest.mark.parametrize("name", HARD)
+@pytest.mark.one_in(2)
 def test_what_is_deep_and_hard_ends_in_a_verdict(name):
     assert isinstance(verdict(*HARD[name], timeout_s=0.5), Match | NoMatch | Unknown)

@@ -65,7 +65,7 @@ def places(count: int) -> list[Place]:
 
 
 @pytest.mark.parametrize("text", CONDITIONS, ids=lambda text: text.splitlines()[-1][8:40])
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(8)
 def test_they_are_those_of_the_drawn_scene(text):
     matcher = Matcher(compiled(PROGRAM.format(text)), MatchOptions())
     wanted = CONDITIONS[text]

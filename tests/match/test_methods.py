@@ -90,7 +90,7 @@ def check_against_brute_force(name, seeds, solver=None):
 
 
 @pytest.mark.parametrize("name", SMALL)
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(8)
 def test_brute_force_agrees(name):
     check_against_brute_force(name, range(3))
 

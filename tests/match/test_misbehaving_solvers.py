@@ -90,7 +90,7 @@ COMMANDS = {
 
 
 @pytest.mark.parametrize("reason", COMMANDS)
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(6)
 def test_a_command_that_misbehaves_leaves_its_frames_unknown(reason, honest, verdicts, tmp_path):
     stub = tmp_path / "stub.py"
     stub.write_text(COMMANDS[reason])
@@ -107,6 +107,7 @@ def test_a_command_that_misbehaves_leaves_its_frames_unknown(reason, honest, ver
 
 
 @pytest.mark.skipif(not Path("/proc").is_dir(), reason="worker processes are found in /proc")
+@pytest.mark.slow
 def test_workers_killed_from_outside_cost_no_frame_its_verdict_but_those_at_work(
     honest, verdicts, started_processes, monkeypatch
 ):
@@ -151,6 +152,7 @@ def test_workers_killed_from_outside_cost_no_frame_its_verdict_but_those_at_work
         assert any(row["verdict"] != "unknown" for row in found.values())
 
 
+@pytest.mark.slow
 def test_solvers_that_hang_end_with_their_timeouts(verdicts, honest, tmp_path):
     stub = tmp_path / "stub.py"
     stub.write_text("import time; time.sleep(600)")

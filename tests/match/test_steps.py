@@ -39,7 +39,7 @@ def verdicts(scenario, labels, timeout_s):
 
 
 @pytest.mark.parametrize("step", STEPS)
-@pytest.mark.one_in(8)
+@pytest.mark.one_in(16)
 def test_nothing_is_decided_otherwise_without_a_step(step, decided):
     for scenario, labels, known in decided:
         with ExitStack() as stack:

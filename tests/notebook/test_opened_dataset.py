@@ -47,6 +47,7 @@ def test_the_public_names_are_few_and_all_there():
         ({"radius": 20.0, "classes": "coarse"}, ("--radius", "20", "--classes", "coarse")),
     ],
 )
+@pytest.mark.one_in(3)
 def test_results_are_those_of_the_command(town, run, crossroads, crossing, options, arguments):
     expected = lines(run, crossing, crossroads, *arguments)
     found = town.match(crossing, **options)

@@ -19,7 +19,7 @@ def test_every_way_says_what_the_definition_says(seed, tmp_path, rounds):
     chance = random.Random(f"labels {seed}")
     scenes = [random_scene(chance) for _ in range(25)]
     dataset = dataset_of(scenes, tmp_path / "d")
-    for number in range(2 * rounds(8)):
+    for number in range(max(4, rounds(16))):
         program = Maker(random.Random(f"frames-{seed}-{number}")).program()
         assert differences(program, scenes, dataset, (*WAYS, ALL), f"{seed}", counts) == [], program.text
     for way in WAYS:

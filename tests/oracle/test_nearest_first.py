@@ -202,6 +202,7 @@ def test_every_way_through_a_query_tells_the_same_first(folder, seed, tmp_path):
 
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.one_in(3)
+@pytest.mark.slow
 def test_intervals_come_in_the_same_order(folder, seed, tmp_path):
     dataset, labels = folder
     program = drawn_program(random.Random(200 + seed))

@@ -448,11 +448,13 @@ def judge_recording(text, recording, kind, condition, steps, told, seen):
 
 
 @pytest.mark.parametrize("seed", [2, 3])
+@pytest.mark.one_in(2)
 def test_intervals_are_those_of_plain_enumeration(tmp_path, seed):
     seen = run_time(tmp_path / "d", seed, 16)
     assert min(seen["match"], seen["unknown"], seen["no"]) > 10
 
 
+@pytest.mark.slow
 def test_samples_in_pieces_tell_the_same(tmp_path, monkeypatch):
     monkeypatch.setattr(samples, "_AT_ONCE", 30)
     run_time(tmp_path / "d", 3, 12)

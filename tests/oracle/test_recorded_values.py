@@ -303,6 +303,7 @@ def test_frames_carry_what_plain_evaluation_says(tmp_path, seed):
 
 
 @pytest.mark.parametrize("seed", [3])
+@pytest.mark.slow
 def test_intervals_carry_what_plain_evaluation_says(tmp_path, seed):
     seen = run_time(tmp_path / "d", seed, 6)
     assert min(seen["null"], seen["known"]) > 20, seen

@@ -66,7 +66,7 @@ def verdicts(dataset: Dataset, number: int, **changes: object) -> dict[str, obje
 
 @pytest.mark.parametrize("number", range(1, 6))
 @pytest.mark.parametrize("prefilter", [True, False], ids=["prefilter", "no prefilter"])
-@pytest.mark.one_in(9)
+@pytest.mark.one_in(36)
 def test_the_frames_are_those_of_the_independent_reading(data, expected, number, prefilter):
     found = verdicts(data[1], number, prefilter=prefilter)
     assert not any(isinstance(verdict, Unknown) for verdict in found.values())

@@ -292,13 +292,14 @@ def test_each_limit_is_reached_or_it_is_said_why_not():
     [pytest.param(*each, marks=[] if each[1] in FAST else [pytest.mark.slow]) for each in REACHED.items()],
 )
 @pytest.mark.timeout(300)
+@pytest.mark.one_in(3)
 def test_a_limit_is_reached_and_changes_no_answer(compared, limit, name):
     assert compared.compare(name, at_least(limit), traced=True)
 
 
 @pytest.mark.parametrize("name", sorted(FAST & {each for each in INPUTS if each.startswith(("frames", "time"))}))
 @pytest.mark.parametrize("limited", [{"budget": 0}, {"correspondences": 1}, {"timeout_s": 1e-9}], ids=str)
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(6)
 def test_no_option_that_limits_changes_an_answer(stores, compared, name, limited):
     usual = ask(stores, name, traced=False)
     found = INPUTS[name](stores, **limited)

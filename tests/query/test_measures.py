@@ -248,6 +248,7 @@ def test_measures_are_those_of_numpy(tmp_path, seed):
     assert min(seen[each] for each in least) >= 2, seen
 
 
+@pytest.mark.slow
 def test_requirements_ask_the_same(tmp_path):
     draw = random.Random(5)
     write_dataset(tmp_path / "d", recordings(draw, 10), {}, name="d")
@@ -311,6 +312,7 @@ def test_real_scenic_is_told_the_same(monkeypatch):
     assert street().lanes
 
 
+@pytest.mark.slow
 def test_what_is_hidden_is_behind_a_box(tmp_path):
     draw, seen, labels = random.Random(8), Counter[str](), []
     for n in range(60):

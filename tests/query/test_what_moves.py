@@ -116,7 +116,7 @@ def conditions(which: int) -> list[str]:
 
 
 @pytest.mark.parametrize("way", WAYS)
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(8)
 def test_frames_are_read_as_they_are_observed(moving, way):
     held = "".join(f"require ({each})\n" for each in conditions(0))
     assert verdicts(moving, held, WAYS[way]).count(Match) >= SAMPLES - 2
@@ -138,7 +138,7 @@ COMMANDS = (("auto",), ("smt",), ("monolithic",), ("auto", "--no-prefilter"), ("
 
 @pytest.mark.parametrize("words", COMMANDS, ids=" ".join)
 @pytest.mark.parametrize("place", ["frames", *OVER_TIME])
-@pytest.mark.one_in(18)
+@pytest.mark.one_in(36)
 def test_the_installed_command_reads_what_is_observed(moving, still_unknown, place, words, command, tmp_path):
     form = "require ({0})" if place == "frames" else OVER_TIME[place]
 
@@ -156,7 +156,7 @@ def test_the_installed_command_reads_what_is_observed(moving, still_unknown, pla
 
 
 @pytest.mark.parametrize("way", WAYS)
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(8)
 def test_a_frame_that_hangs_on_what_is_not_observed_is_unknown(still_unknown, way):
     for which in (0, 1):
         for word in (" and ", " or "):
@@ -190,7 +190,7 @@ def test_an_interval_that_hangs_on_what_is_not_observed_is_unknown(still_unknown
         ("require len([o for o in (ego, c) if o.speed > 3 or o.position.x >= 0]) == 2", Match),
     ],
 )
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(8)
 def test_unknown_only_where_it_makes_a_difference(still_unknown, way, text, verdict):
     found = verdicts(still_unknown, text + "\n", WAYS[way])
     assert set(found) - {NoMatch} == ({verdict} - {None})

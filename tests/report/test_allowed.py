@@ -85,6 +85,7 @@ def test_the_drawn_area_holds_every_object(world, name):
 
 
 @pytest.mark.parametrize("name", list(BOUND))
+@pytest.mark.one_in(2)
 def test_the_drawn_wedges_hold_the_heading(world, name):
     matcher, labels = _scenes(world, BOUND[name])
     wedges = 0
@@ -103,6 +104,7 @@ def test_the_drawn_wedges_hold_the_heading(world, name):
 
 
 @pytest.mark.parametrize("name", list(FREE))
+@pytest.mark.one_in(3)
 def test_the_drawn_area_is_exactly_what_matches(world, name):
     """Moved anywhere inside, `other` still matches; moved outside, it does not."""
     matcher, labels = _scenes(world, FREE[name])

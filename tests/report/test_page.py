@@ -79,6 +79,7 @@ def _long_run(page):
     return page.run("return '#' + [...document.querySelectorAll('.run')].find(e => Number(e.dataset.length) > 2).id")
 
 
+@pytest.mark.slow
 def test_the_slider_shows_one_frame_after_the_other(opened):
     run = _long_run(opened)
     first = _state(opened, run)

@@ -326,6 +326,7 @@ def solver(request: pytest.FixtureRequest) -> Iterator[SolverSession | BuiltIn]:
 
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda example: example.name)
+@pytest.mark.one_in(3)
 def test_answers(solver: SolverSession | BuiltIn, example: Example) -> None:
     if not example.polynomial and "z3" in solver.name:
         pytest.skip("z3 has no transcendental functions")

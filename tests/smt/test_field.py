@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import pytest
 from shapely import Polygon, box
 
 from scenicq.geometry.angles import distance
@@ -31,6 +32,7 @@ FIELDS = {
 }
 
 
+@pytest.mark.slow
 def test_the_formula_allows_what_the_field_allows() -> None:
     rng = np.random.default_rng(5)
     for name, field in FIELDS.items():

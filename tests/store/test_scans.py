@@ -108,6 +108,7 @@ def test_a_folder_is_no_column(value: str, town: Path, expected: tuple[Any, Any]
 
 
 @pytest.mark.parametrize("value", ["1", "zzz"])
+@pytest.mark.one_in(2)
 def test_nor_are_all_of_them(value: str, town: Path, expected: tuple[Any, Any], tmp_path: Path) -> None:
     place = tmp_path.joinpath(*(f"{column}={value}" for column in COLUMNS), "town")
     shutil.copytree(town, place)
@@ -122,7 +123,7 @@ _FEW = {"class=1", "map=zzz", "a?b", "{a,b}", "a%3Fb"}
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=[] if name in _FEW else [pytest.mark.slow]) for name in ELSEWHERE]
 )
-@pytest.mark.one_in(5)
+@pytest.mark.one_in(10)
 def test_nor_in_object_storage(name: str, bucket: Any, town: Path, other: Path, expected: tuple[Any, Any]) -> None:
     """A sibling that a pattern would find is beside it."""
     places = {f"fleet/{name}": town} | ({f"fleet/{PATTERNS[name]}": other} if name in PATTERNS else {})
@@ -145,7 +146,7 @@ def test_answers_stay_the_same(column: str, town: Path, expected: tuple[Any, Any
 
 @pytest.mark.parametrize("name", [*PATTERNS, *ORDINARY])
 @pytest.mark.parametrize("deep", [False, True])
-@pytest.mark.one_in(20)
+@pytest.mark.one_in(40)
 def test_a_folder_is_no_pattern(
     name: str, deep: bool, town: Path, other: Path, expected: tuple[Any, Any], tmp_path: Path
 ) -> None:

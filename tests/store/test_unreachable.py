@@ -54,6 +54,7 @@ READING = {
 
 @pytest.mark.parametrize("what", READING)
 @pytest.mark.one_in(10)
+@pytest.mark.slow
 def test_a_dataset_that_is_removed_while_it_is_read(
     what: str, crossroads: Path, tmp_path: Path, run: Any, rounds: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -116,6 +117,7 @@ class NoCredentialsError(Exception):
     ],
 )
 @pytest.mark.one_in(8)
+@pytest.mark.slow
 def test_what_a_store_says_at_any_request_is_told(
     raised: Exception, words: str, crossroads: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -180,6 +182,7 @@ EXPIRED = b"<Error><Code>ExpiredToken</Code><Message>The provided token has expi
 
 
 @pytest.mark.parametrize(("answer", "words"), [(EXPIRED, "these credentials"), (None, "cannot be read")])
+@pytest.mark.one_in(2)
 def test_of_s3_itself(answer: bytes | None, words: str, run: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     s3fs = pytest.importorskip("s3fs", reason="scenicq[s3] is not installed")
     monkeypatch.setattr(remote, "_PATIENCE_S", 3)

@@ -36,6 +36,7 @@ def dataset(tmp_path_factory) -> Dataset:
 @pytest.mark.parametrize("method", ["auto", "smt", "monolithic"])
 @pytest.mark.parametrize("over_time", [False, True])
 @pytest.mark.one_in(8)
+@pytest.mark.slow
 def test_comparisons_with_speeds(dataset, over_time, method):
     ways = (False, True) if method == "auto" else (False,)
     for op, turned, negated in itertools.product(OPERATORS, ways, ways):

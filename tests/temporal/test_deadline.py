@@ -140,7 +140,7 @@ def only_ours() -> Iterator[None]:
 
 
 @pytest.mark.parametrize("program", PROGRAMS)
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(6)
 @pytest.mark.usefixtures("only_ours")
 def test_nothing_takes_long_between_two_looks_at_the_clock(program, recording, monkeypatch):
     dataset = recording(8000)

@@ -118,6 +118,7 @@ def check(case, other, seed):
         decided[value] += 1
 
 
+@pytest.mark.slow
 def test_what_bounds_tell_is_so_for_values_within():
     check()
     assert min(decided.values()) > 40

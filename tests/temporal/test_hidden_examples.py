@@ -47,6 +47,7 @@ def farthest(dataset, result):
     return mine, spans
 
 
+@pytest.mark.slow
 def test_nothing_is_left_unknown_and_both_verdicts_are_there(found):
     assert {type(each.verdict) for each in found} == {Match, NoMatch}
 

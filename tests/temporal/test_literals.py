@@ -31,6 +31,7 @@ def verdicts(folder, text):
 
 
 @pytest.mark.parametrize(("one", "other"), list(zip(SAYS_SO, DENIES_IT[1:] + DENIES_IT[:1], strict=True)))
+@pytest.mark.one_in(2)
 def test_one_of_a_condition_and_its_negation_holds(folder, one, other):
     whole = {("r-0", "r-2"): "Match", ("r-2", "r-2"): "Match"}
     assert verdicts(folder, f"require (always ({one})) or (eventually ({other}))\n") == whole

@@ -34,6 +34,7 @@ def _trace(draw):
 
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.one_in(3)
+@pytest.mark.slow
 def test_the_prefilter_changes_nothing(tmp_path, seed, rounds):
     draw = random.Random(seed)
     traces = {f"r{number}": _trace(draw) for number in range(2)}

@@ -4,6 +4,7 @@ import random
 from itertools import product
 
 import numpy as np
+import pytest
 
 from scenicq.forest.nodes import Compare, CompareOp, Constant, Logic, LogicOp
 from scenicq.forest.temporal import Always, And, Atom, Eventually, Next, Not, Or, Until
@@ -75,6 +76,7 @@ def test_agrees_with_the_recursive_definition(rounds):
         assert found == [2 * recursive(formula, trace, k) for k in range(len(trace))]
 
 
+@pytest.mark.slow
 def test_unknown_is_what_completions_tell_apart():
     draw = random.Random(8)
     unknown = 0

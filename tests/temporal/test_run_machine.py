@@ -162,6 +162,7 @@ def test_runs_are_unknown_only_where_completions_differ():
 
 @pytest.mark.parametrize("name", ["formula_clauses", "observation_ways", "run_modes", "run_situations"])
 @pytest.mark.parametrize("least", [0, 1, 2])
+@pytest.mark.one_in(2)
 def test_a_limit_makes_unknown_at_most(monkeypatch: pytest.MonkeyPatch, name: str, least: int):
     monkeypatch.setattr(LIMITS, name, least)
     compare(random.Random(2), 40, limited=True)

@@ -217,6 +217,7 @@ def test_what_cancels_out_has_a_value_all_the_same():
     assert isinstance(check([compared("width", node, 1.5)]), Refuted)
 
 
+@pytest.mark.slow
 def test_very_many_choices_are_left_to_a_solver():
     picks = [Select(Index((1.0, 1.0)), (c(1.0), c(1.5))) for _ in range(400)]
     total = picks[0]

@@ -39,6 +39,7 @@ def cases(monkeypatch):
 
 
 @pytest.mark.parametrize("name", BENDS)
+@pytest.mark.one_in(2)
 def test_a_bend_is_followed_without_a_solver_and_without_all_combinations(name, cases):
     scenario = compiled(ON_BEND + BENDS[name], BEND)
     matcher = Matcher(scenario, MatchOptions(tolerance=EXACT))
@@ -54,6 +55,7 @@ def test_a_bend_is_followed_without_a_solver_and_without_all_combinations(name, 
     assert 0 < sum(cases) < FEW
 
 
+@pytest.mark.slow
 def test_a_place_matches_where_walking_back_leads_to_a_spot_on_the_road(rounds):
     scenario = compiled(ON_BEND + BENDS["a known way"], BEND)
     matcher, field = Matcher(scenario, MatchOptions(tolerance=EXACT)), BEND.roadDirection

@@ -94,6 +94,7 @@ def test_chains_through_an_intersection_are_decided_without_a_solver(cars, label
         assert isinstance(matcher.match(pushed), NoMatch)
 
 
+@pytest.mark.slow
 def test_cells_of_one_box_are_looked_for_once(monkeypatch):
     asked = []
 
@@ -114,6 +115,7 @@ def test_cells_of_one_box_are_looked_for_once(monkeypatch):
     assert most > 1
 
 
+@pytest.mark.slow
 def test_what_misses_a_solution_by_little_is_repaired():
     rng, tolerance, count = random.Random(5), MatchOptions(tolerance=EXACT).tolerance, 0
     for seed in range(4):

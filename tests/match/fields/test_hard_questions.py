@@ -105,6 +105,7 @@ def test_the_same_problem_has_the_same_answer() -> None:
     assert answers[1:] == answers[:1] * 2
 
 
+@pytest.mark.slow
 def test_deep_terms() -> None:
     term: Term = X
     for _ in range(5000):

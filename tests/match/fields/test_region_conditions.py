@@ -104,6 +104,7 @@ def test_what_is_true_somewhere_is_never_excluded(seed: int) -> None:
 
 @pytest.mark.parametrize("wanted", [True, False])
 @pytest.mark.parametrize("seed", range(30))
+@pytest.mark.one_in(3)
 def test_of_a_small_box_it_is_known(seed: int, wanted: bool) -> None:
     """But for the very border, where a condition fails it is excluded once the box is small."""
     rng, known, asked = random.Random(seed), 0, 0

@@ -93,6 +93,7 @@ def test_a_way_without_a_solution_excludes_only_if_its_program_is_exact(monkeypa
     assert isinstance(outcome, Refuted if exact[0] else Undecided)
 
 
+@pytest.mark.slow
 def test_one_shift_suits_all_cars_exactly_where_some_value_of_it_does(asked):
     # one car is moved aside: alone it may have a shift, but perhaps not that of the others
     tolerance, rng, told = Tolerance(position=0.05, heading=0.02), random.Random(3), []
@@ -128,6 +129,7 @@ def blamed(outcome, parts):
 
 
 @pytest.mark.parametrize("far", [3.0, 12.0])
+@pytest.mark.one_in(2)
 def test_parts_suit_each_other_exactly_where_arithmetic_says_so(far, monkeypatch):
     monkeypatch.setattr(field_solver, "find_witness", lambda *_, **__: None)
     rng, met = random.Random(1), Counter()

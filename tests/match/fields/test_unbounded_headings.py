@@ -19,6 +19,7 @@ BEHIND = "new Car behind spot by Range(2, 14), facing {} relative to spot, with 
 
 
 @pytest.mark.parametrize("heading", ["Normal(46, 21) deg", "Normal(0, 1)", "Normal(Range(0, 1), 2)"])
+@pytest.mark.one_in(3)
 def test_a_heading_without_bounds_is_no_error(heading, monkeypatch):
     monkeypatch.setattr(field_solver, "find_witness", lambda *_, **__: None)
     scenario = compiled(EGO + SPOT + BEHIND.format(heading))

@@ -44,6 +44,7 @@ def test_a_point_in_a_sector_is_found_where_the_sector_is(angle):
 
 
 @pytest.mark.parametrize("angle", ANGLES)
+@pytest.mark.one_in(2)
 def test_a_point_of_a_line_in_a_sector_is_found_where_both_are(angle):
     line = PolylineSet((LineString([(-12, -9), (4, 1), (9, 14)]),), "line", None)
     sector = Sector((0.0, 0.0), 12.0, -0.8, angle)

@@ -53,6 +53,7 @@ FURTHER = {
 
 @pytest.mark.parametrize("enforced", [MatchOptions().enforce, frozenset(BuiltIn)], ids=["plain", "enforced"])
 @pytest.mark.parametrize("text", [*PROGRAMS.values(), *FURTHER.values()])
+@pytest.mark.one_in(3)
 def test_what_does_not_matter_changes_no_group(text, enforced):
     scenario, options = compiled(HEADER + text), MatchOptions(enforce=enforced)
     relevant = relevant_properties(scenario, options)

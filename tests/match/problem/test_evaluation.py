@@ -66,6 +66,7 @@ def test_one_use_has_one_direction_in_all_constraints_and_two_uses_have_their_ow
 
 
 @pytest.mark.parametrize(("uses", "found"), [(10, True), (11, False)])
+@pytest.mark.one_in(2)
 def test_combinations_are_tried_up_to_a_limit_of_one_part(uses, found):
     # steps of different lengths from the left: only the last of all combinations leads to the end
     start = (-9.0, 0.0)

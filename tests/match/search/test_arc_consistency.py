@@ -19,6 +19,7 @@ from scenicq.store.labels import Label, LabelObject
 
 
 @pytest.mark.parametrize("name", PROGRAMS)
+@pytest.mark.one_in(3)
 def test_thinning_never_removes_a_right_candidate(name):
     scenario = compiled(HEADER + PROGRAMS[name])
     matcher = Matcher(scenario, MatchOptions(tolerance=EXACT))

@@ -71,6 +71,7 @@ def checker(forbidden, doubtful=()):
 
 @settings(max_examples=200, deadline=None)
 @given(problems(), st.booleans())
+@pytest.mark.slow
 def test_the_search_finds_every_assignment_once(problem, linked):
     slots, forbidden = problem
     links = {}

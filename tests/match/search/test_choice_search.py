@@ -64,6 +64,7 @@ def check(seed: int) -> list[bool]:
     return found
 
 
+@pytest.mark.slow
 def test_verdicts_are_those_of_all_combinations(rounds: Callable[[int], int]) -> None:
     found = [each for seed in range(rounds(40)) for each in check(seed)]
     assert 0.2 < sum(found) / len(found) < 0.9
@@ -119,6 +120,7 @@ def chosen(name: str, options: dict[str, list[float | str]], picks: dict[str, in
     return chosen(found, options, picks) if isinstance(found, str) else found
 
 
+@pytest.mark.slow
 def test_choices_that_several_objects_share_come_out_the_same_in_all(rounds: Callable[[int], int]) -> None:
     found = []
     for seed in range(rounds(60)):
@@ -161,6 +163,7 @@ ego = new Thing with pace k * a * b * c, with drive k + a * b - b * c, with thir
 
 
 @pytest.mark.parametrize(("chosen", "option"), [(1, 0), (3, 1), (9, 2), (5, None)])
+@pytest.mark.one_in(2)
 def test_what_is_left_of_an_option_goes_to_a_solver_where_nothing_else_decides_it(
     chosen: float, option: float | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:

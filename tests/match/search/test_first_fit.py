@@ -36,7 +36,7 @@ BY_THEMSELVES = ("ahead", "offset", "left of", "facing field", "normal", "rows",
 
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("radius", [None, 30.0])
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(12)
 def test_a_search_finds_the_same(name, radius, monkeypatch):
     scenario = compiled(HEADER + CASES[name])
     matcher = Matcher(scenario, MatchOptions(radius=radius))

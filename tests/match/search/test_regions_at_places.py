@@ -33,6 +33,7 @@ def inside(rng, area):
             return place
 
 
+@pytest.mark.slow
 def test_a_car_on_the_lane_at_a_place_near_the_ego_is_on_a_lane_that_comes_near_the_ego(rounds):
     scenario = compiled(
         f"{HEADER}p = new Point on road\nlane = network.laneAt(p, reject=True)\nother = new Car on lane, {ANYHOW}"

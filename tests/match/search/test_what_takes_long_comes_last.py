@@ -78,12 +78,14 @@ def matcher():
     return Matcher(compiled(FOLLOWERS, junction()), MatchOptions(tolerance=TOLERANCE, timeout_s=20))
 
 
+@pytest.mark.slow
 def test_where_ways_cross_two_followers_of_one_hidden_point_are_found_by_luck(matcher, cases):
     for seed in (2, 4, 5):
         assert isinstance(matcher.match(label(seed)), Match)
     assert cases[0] < 2000, "most ways are never looked at"
 
 
+@pytest.mark.slow
 def test_what_another_group_excludes_is_not_gone_into(matcher, cases):
     seen = label(2)
     (lead,) = seen.objects
@@ -91,6 +93,7 @@ def test_what_another_group_excludes_is_not_gone_into(matcher, cases):
     assert cases[0] < 1500, "the heading alone excludes it"
 
 
+@pytest.mark.slow
 def test_more_patience_goes_on_where_less_has_stopped(cases, monkeypatch):
     monkeypatch.setattr(field_solver, "find_witness", lambda *_, **__: None)
     several = 0
@@ -130,6 +133,7 @@ def test_what_two_groups_ask_of_the_same_objects_is_looked_for_once(monkeypatch)
     assert most > 2
 
 
+@pytest.mark.slow
 def test_unlikely_values_are_looked_at_last(monkeypatch):
     asked = []
     search = field_solver.search_directions

@@ -108,6 +108,7 @@ def test_what_a_map_lacks_is_told_with_the_dataset(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("prefilter", [True, False])
+@pytest.mark.one_in(2)
 def test_frames_of_a_map_that_lacks_something_have_their_rows(tmp_path: Path, prefilter: bool) -> None:
     source = Path(shutil.copytree(SAMPLES / "crossroads", tmp_path / "source"))
     labels = [json.loads(line) for line in (source / "labels.jsonl").read_text().splitlines()]

@@ -46,6 +46,7 @@ def _run(command: Path, dataset: Path, folder: Path, *before: str) -> subprocess
     )
 
 
+@pytest.mark.slow
 def test_nothing_is_left_and_what_a_killed_run_has_left_goes(command: Path, crossroads: Path, tmp_path: Path) -> None:
     """A folder that was used a minute ago at least, and that nobody uses, is one that is left."""
     for name in ("left", "used", "new"):

@@ -29,7 +29,7 @@ def datasets(tmp_path_factory):
 
 @pytest.mark.parametrize("options", [{}, {"prefilter": False}, {"ego": "any"}, {"every": True}], ids=str)
 @pytest.mark.parametrize("program", PROGRAMS)
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(12)
 def test_each_map_alone_gives_the_same(datasets, program, options):
     def found(dataset):
         query = Query(dataset, Source("p", PROGRAMS[program]), read_options(model=DRIVING, **options))

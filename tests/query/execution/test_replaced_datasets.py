@@ -166,6 +166,7 @@ def test_nothing_opens_a_dataset_in_another_process_by_its_address() -> None:
 
 
 @pytest.mark.parametrize("ways", [by_blocks, by_shards, pytest.param(by_dask, marks=pytest.mark.slow)])
+@pytest.mark.one_in(2)
 def test_a_file_that_a_program_imports_is_read_once(ways: Callable[[Query], Iterator[Result]], tmp_path: Path) -> None:
     """Whoever does the work, the answers are those of the program as it was when the query began."""
     ingest(SAMPLES / "crossroads", tmp_path / "d")

@@ -64,6 +64,7 @@ def taken(query: Query, results: Iterator[Any]) -> tuple[list[Any], ResultSummar
 
 
 @pytest.mark.parametrize(("limit", "jobs"), [(1, 1), (2, 1), (5, 1), (9, 2), (17, 1), (30, 1), (31, 1), (99, 1)])
+@pytest.mark.one_in(2)
 def test_what_a_limit_skips_is_what_all_does_not_name(town: Dataset, limit: int, jobs: int) -> None:
     options = replace(read_options(limit=limit, every=True, model=DRIVING), jobs=jobs)
     found, summary = taken(query := Query(town, Source("p", PLAIN), options), query.results())
@@ -89,6 +90,7 @@ class Clock:
 
 @pytest.mark.parametrize("engine", [False, True])
 @pytest.mark.parametrize("program", [PLAIN, OVER_TIME])
+@pytest.mark.one_in(2)
 def test_what_a_deadline_skips_is_what_all_does_not_name(
     town: Dataset, monkeypatch: pytest.MonkeyPatch, program: str, engine: bool
 ) -> None:
@@ -179,6 +181,7 @@ def lines_of(file: Path) -> list[dict[str, Any]]:
 
 
 @pytest.mark.parametrize("case", CUTS)
+@pytest.mark.one_in(2)
 def test_each_format_says_the_same(cut_files: dict[tuple[str, str], Path], case: str) -> None:
     *_, last = lines_of(cut_files[case, "jsonl"])
     told = last["summary"]
@@ -335,7 +338,7 @@ def parked(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("limit", [3, 20])
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(4)
 def test_an_evaluation_counts_only_what_was_looked_at(
     run: Any, parked: Path, tmp_path: Path, form: str, limit: int
 ) -> None:

@@ -107,6 +107,7 @@ def test_a_frame_that_kills_is_unknown_and_no_other(dataset: Dataset, scenarios:
 
 @needs_signals
 @pytest.mark.parametrize("jobs", [1, 2])
+@pytest.mark.one_in(2)
 def test_pieces_in_order_are_the_whole(dataset: Dataset, undisturbed: Found, jobs: int) -> None:
     found, decided, killed = query(dataset, jobs=jobs), [], []
 

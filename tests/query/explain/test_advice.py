@@ -183,6 +183,7 @@ def test_labels_that_had_all_their_time_have_none_left_for_advice(dataset, monke
     assert solver.now_s > before_s
 
 
+@pytest.mark.slow
 def test_the_command_advises_where_nothing_matches_and_when_asked(run, crossroads, scenarios, tmp_path):
     file = tmp_path / "p.scenic"
     file.write_text(TEXT)
@@ -203,6 +204,7 @@ def test_the_command_advises_where_nothing_matches_and_when_asked(run, crossroad
 
 
 @pytest.mark.parametrize(("frames", "told"), [(1000, False), (1001, True)])
+@pytest.mark.one_in(2)
 def test_less_than_a_frame_in_a_thousand_is_hardly_any(frames, told, run, tmp_path):
     """One match in 1,000 frames is left alone; of one in 1,001 it is said what excludes the others."""
     ego = {"position": [0, 0], "heading": 0, "width": 2, "length": 4, "class": "Car"}

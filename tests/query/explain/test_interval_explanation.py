@@ -137,6 +137,7 @@ def test_a_recording_in_which_nothing_begins(tmp_path, crossroads):
 
 
 @pytest.mark.parametrize("name", ["01_pedestrian_crosses", "02_cut_in", "03_waits_then_goes", "05_parked"])
+@pytest.mark.one_in(2)
 def test_what_would_do_does(tmp_path, crossroads, name):
     """Of the programs of the sample, in every recording: a number that is told lets the interval through."""
     text = (PROGRAMS / f"{name}.scenic").read_text(encoding="utf-8")

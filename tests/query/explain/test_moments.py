@@ -33,6 +33,7 @@ def programs(tmp_path_factory):
 
 @pytest.mark.parametrize("seconds", ["0.5", "2", "12"])
 @pytest.mark.one_in(3)
+@pytest.mark.slow
 def test_a_recording_and_a_frame_match_where_match_has_an_interval(run, crossroads, programs, seconds):
     program = programs / "along.scenic"
     found = lines_of(run("match", program, crossroads, "--min-duration", seconds, "--format", "jsonl"))
@@ -72,6 +73,7 @@ def drawn_roles(picture: str) -> dict[str, str]:
     return dict(re.findall(r"<title>role (\w+), ([^,<]+),", html.unescape(picture)))
 
 
+@pytest.mark.slow
 def test_a_picture_has_the_roles_of_the_interval(run, crossroads, programs):
     """It does so for any of its frames, where the initial scene alone may be played by another object."""
     program = programs / "over_time.scenic"
@@ -101,6 +103,7 @@ def test_a_picture_has_the_roles_of_the_interval(run, crossroads, programs):
     assert others
 
 
+@pytest.mark.slow
 def test_python_says_what_the_command_says(run, crossroads, programs):
     for name, options in (("over_time", {}), ("along", {"min_duration": 1})):
         program = programs / f"{name}.scenic"

@@ -95,6 +95,7 @@ def test_a_number_that_is_not_enough_is_not_told(crossroads):
     assert nearest_intervals(ask(crossroads, program), 3) == []
 
 
+@pytest.mark.slow
 def test_from_the_command_line(run, crossroads, tmp_path):
     path = tmp_path / "parked.scenic"
     path.write_text(HEAD + "parked = new Car\nrequire always parked.speed < 0.2\n", encoding="utf-8")

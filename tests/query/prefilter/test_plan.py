@@ -70,7 +70,7 @@ def found(
 
 
 @pytest.mark.parametrize("name", ["ahead", "offset", "figure 3", "facing field", "shared heading", "crowd"])
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(8)
 def test_the_prefilter_keeps_to_scopes(dataset, name):
     scenario = compile_scenario(Source("test.scenic", HEADER + PROGRAMS[name]), STREET)
     rng = random.Random(name)
@@ -116,7 +116,7 @@ def tied_cases():
 
 
 @pytest.mark.parametrize(("name", "options"), list(tied_cases()))
-@pytest.mark.one_in(12)
+@pytest.mark.one_in(48)
 def test_nothing_is_lost_between_objects_and_in_unions(tied, name, options):
     text = (TIED | RANDOM)[name]
     with_it, query = found(tied, text, OPTIONS[options], prefilter=True)
