@@ -171,4 +171,4 @@ def test_a_limit_makes_unknown_at_most(monkeypatch: pytest.MonkeyPatch, name: st
 @pytest.mark.slow
 @pytest.mark.timeout(3600)
 def test_many_runs_are_unknown_only_where_completions_differ():
-    assert compare(random.Random(3), 10_000) > 40_000
+    assert compare(random.Random(3), 4000) > 16_000

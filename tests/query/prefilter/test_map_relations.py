@@ -222,4 +222,4 @@ def test_sql_says_what_the_matcher_says(dataset: Dataset, rounds):
 
 @pytest.mark.slow
 def test_sql_says_of_many_what_the_matcher_says(dataset: Dataset):
-    assert sum(check(dataset, seed) for seed in range(1000, 1150)) > 120
+    assert sum(check(dataset, seed) for seed in range(1000, 1060)) > 50
