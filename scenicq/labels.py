@@ -1,13 +1,14 @@
-"""Courses and measures where real Scenic runs a program: the module that Python finds.
+"""Courses, measures and others where real Scenic runs a program: the module that Python finds.
 
 Scenicq itself reads `from scenicq.labels import ...` without running this. Scenic draws scenes of one instant, in which
 nothing has a track: a course is that of the lane, as of a label that is seen once
-(`scenicq.geometry.driven_courses`), so that drawn scenes match their program. Random arguments are sampled first, as
-those of Scenic's own functions are.
+(`scenicq.geometry.driven_courses`), so that drawn scenes match their program. Nobody is there but the program's own
+objects. Random arguments are sampled first, as those of Scenic's own functions are.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -26,11 +27,14 @@ __all__ = [
     "beside",
     "box_distance",
     "corridor",
+    "count",
     "course",
     "course_change",
     "deceleration_to_avoid",
     "hides",
     "jerk",
+    "nearest",
+    "others",
     "post_encroachment_time",
     "time_headway",
     "time_to_collision",
@@ -70,6 +74,32 @@ def course(owner: Any) -> Any:
 def corridor(owner: Any, half_width: Any) -> Any:
     """What lies within so many metres of the course of an object, as one of Scenic's regions."""
     return _sampled(_corridor)(owner, half_width)
+
+
+def others(of: Any) -> list[Any]:
+    """Those of a class that play no role: none, for a scene has the objects of its program alone."""
+    return []
+
+
+def count(of: Any, *, within: Any = None) -> int:
+    """How many objects of a class there are but the ego, in a region if one is given; for requirements alone.
+
+    Args:
+        of: One of Scenic's classes.
+        within: A region that their centres lie in.
+    """
+    return len(_objects(of, within))
+
+
+def nearest(of: Any, *, within: Any = None) -> Any:
+    """The nearest to the ego of those that `count` counts, the first of equally near ones.
+
+    Returns:
+        The object; where there is none, what is no object, and rejects the scene once something is read of it.
+    """
+    x, y = _xy(import_module("scenic.syntax.veneer").ego())
+    found = _objects(of, within)
+    return min(found, key=lambda each: math.hypot(_xy(each)[0] - x, _xy(each)[1] - y), default=_Nobody())
 
 
 def time_to_collision(one: Any, other: Any) -> Any:
@@ -132,6 +162,22 @@ def post_encroachment_time(one: Any, other: Any) -> Any:
     Allen, Shin and Cooper, *Analysis of traffic conflicts and collisions*, 1978. 0 where both are there at once.
     """
     return _sampled(_post_encroachment_time)(one, other)
+
+
+def _objects(of: Any, within: Any) -> list[Any]:
+    """The objects of a class in the scene, or in the simulation that runs, but the ego."""
+    veneer = import_module("scenic.syntax.veneer")
+    scene = veneer.currentSimulation or veneer.currentScenario
+    ego = veneer.ego()
+    found = [each for each in scene.objects if each is not ego and isinstance(each, of)]
+    return [each for each in found if within is None or within.containsPoint(each.position)]
+
+
+class _Nobody:
+    """Where nobody is the nearest: what is read of it does not hold."""
+
+    def __getattr__(self, name: str) -> Any:
+        raise import_module("scenic.core.distributions").RejectionException(f"there is nobody whose {name} is asked")
 
 
 def _time_to_collision(one: Any, other: Any) -> float:

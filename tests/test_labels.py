@@ -23,6 +23,7 @@ def scenic(monkeypatch):
     made = {name: ModuleType(name) for name in ("scenic", "scenic.core", "scenic.core.distributions")}
     made["scenic.core.distributions"].distributionFunction = lambda function: function
     made["scenic.core.distributions"].RejectionException = Rejected
+    made["scenic.syntax.veneer"] = ModuleType("scenic.syntax.veneer")
     made["scenic.core.regions"] = ModuleType("scenic.core.regions")
     made["scenic.core.regions"].PolygonalRegion = lambda polygon: polygon
     made["scenic.core.regions"].PolylineRegion = lambda polyline: polyline
@@ -85,6 +86,46 @@ def test_regions_are_scenics(scenic, lanes):
     assert corridor.area == pytest.approx(300 + 7.07, abs=0.1)
     nowhere = SimpleNamespace(position=(0.0, 0.0), heading=0.0)
     assert labels.along(nowhere, (0.0, 20.0)) == 20
+
+
+class Car(SimpleNamespace):
+    pass
+
+
+class Bus(Car):
+    pass
+
+
+@pytest.fixture(params=["a scene", "a simulation"])
+def there(request, scenic):
+    """The ego at the origin, and who is around it, in a requirement on a scene or while a simulation runs."""
+    ego, near, bus, far = (Car(position=(x, 0, 0)) for x in (0, 5, -5, 9))
+    bus.__class__ = Bus
+    drawn = SimpleNamespace(objects=(ego, far, near, bus))
+    first, veneer = SimpleNamespace(objects=(ego, far)), sys.modules["scenic.syntax.veneer"]
+    simulated = request.param == "a simulation"
+    veneer.ego = lambda: ego
+    veneer.currentScenario, veneer.currentSimulation = (first, drawn) if simulated else (drawn, None)
+    return SimpleNamespace(ego=ego, near=near, bus=bus, far=far)
+
+
+def test_all_but_the_ego_count(there):
+    assert labels.count(Car) == 3
+    assert labels.count(Bus) == 1
+    assert labels.count(Car, within=SimpleNamespace(containsPoint=lambda place: place[0] > 0)) == 2
+    assert labels.others(Car) == []
+
+
+def test_the_first_of_the_nearest_is_meant(there):
+    assert labels.nearest(Car) is there.near
+    assert labels.nearest(Bus) is there.bus
+
+
+def test_what_is_read_of_nobody_rejects_the_scene(there):
+    nobody = labels.nearest(str)
+    assert nobody is not there.near
+    with pytest.raises(Rejected, match="there is nobody whose speed is asked"):
+        assert nobody.speed > 1
 
 
 def test_without_scenic_it_says_what_it_is_for(monkeypatch):

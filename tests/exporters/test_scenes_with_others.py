@@ -22,6 +22,7 @@ ASKED = [
     "not (a is nearest(Object))",
     "(distance to nearest(Car)) < 30",
     "count(Car, within=CircularRegion(ego, 40)) >= 1",
+    "count(Car, within=CircularRegion(ego.position, 40)) >= 1",
     "count(Car) == 2 and count(Object) == 3",
     "not any((distance to d) < 1000 for d in others(Object))",
     "all(d.speed > 99 for d in others(Car)) and len(others(Car)) == 0",
