@@ -11,6 +11,11 @@ from scenicq.store.writer import write_dataset
 OBJECTS = "".join(f"{name} = new Object at (Range(-99, 99), Range(-99, 99)), facing 0\n" for name in ("ego", "a", "b"))
 MONITOR = "monitor Stays(one, other):\n    while (distance from one to other) < {}:\n        wait\n    terminate\n"
 LATER = "monitor Near(one, time):\n    wait for time seconds\n    require (distance from one to ego) < 50\n"
+APART = "".join(
+    f"monitor Near{name}():\n    while True:\n        require (distance from {name} to ego) < {{}}\n        wait\n"
+    f"require monitor Near{name}()\n"
+    for name in "ba"
+)
 
 
 @pytest.fixture(scope="module")
@@ -34,6 +39,8 @@ def folder(tmp_path_factory):
         ("terminate when (distance to a) > 9\nterminate when (distance to b) > 9\n", 1),
         (f"{MONITOR.format(12)}require monitor Stays(a, b)\n", 1),
         ("D = Range(10, 12)\nrequire always (distance from a to b) < D\n", 1),
+        (APART.format(50, 50), 1),
+        (APART.format(50, 40), 2),
         ("require always (distance to a) < 9\n", 2),
         ("require always (distance to a) < 9\nrequire always (distance to b) < 8\n", 2),
         ("require (always (distance to a) < 9) and (eventually (distance to b) > 4)\n", 2),

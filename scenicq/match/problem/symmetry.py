@@ -38,6 +38,7 @@ from scenicq.forest.temporal import (
     Reject,
     Terminate,
     Test,
+    Wait,
     operands,
 )  # fmt: skip
 from scenicq.forest.value_numbers import ValueNumbers, parts_of
@@ -283,5 +284,8 @@ def _step(step: ProcessStep, atoms: Sequence[int]) -> Hashable:
             return "test", atoms[step.condition.number], step.then, step.otherwise
         case Terminate() | Reject() | End():
             return type(step).__name__
+        case Wait():
+            # where the program says it makes no difference
+            return "wait", step.then, step.timers
         case _:
             return step
