@@ -183,4 +183,6 @@ def _text(found: Evaluation) -> str:
         if each.simulated is not None:
             lines.append(plain(each.simulated.sentence))
         lines.append("")
+    if found.benchmark is not None:
+        lines += [found.benchmark.sentence, ""]
     return "\n".join(lines)

@@ -84,6 +84,7 @@ CODES: dict[str, str] = {
     "results-incomplete": "results do not say of every frame whether it matches, or nobody knows whether they do",
     "ranking-cut": "a ranking has not looked at all that may be among the closest",
     "predictions-invalid": "a predicted box has a value that makes no sense",
+    "predictions-doubtful": "predictions look like a placeholder, or their benchmark's own evaluation refuses them",
     "predictions-duplicate": "a predicted box or frame is there more than once",
     "predictions-missing": "a frame of the dataset has no predictions",
     "predictions-unmatched": "predictions are of a frame that the dataset does not have",

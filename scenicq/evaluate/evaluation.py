@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.errors import DataError, Diagnostic
+from scenicq.evaluate.benchmark import BenchmarkFigures, benchmark_figures
 from scenicq.evaluate.classes import ClassFigures, class_figures
 from scenicq.evaluate.clusters import Clusters, find_clusters, parameters_of
 from scenicq.evaluate.comparison import MARGIN, ObjectComparison, compare
@@ -26,6 +27,7 @@ from scenicq.evaluate.resampling import holm, resamples
 from scenicq.evaluate.simulation import Simulated, read_simulated, verdict
 from scenicq.evaluate.slices import Slice, slices
 from scenicq.evaluate.weighting import Weighted, weigh
+from scenicq.importers.prediction_checks import find_doubts
 from scenicq.importers.prediction_files import read_predictions
 from scenicq.importers.predictions import THRESHOLDS_M, Predictions
 from scenicq.option_values import MARGIN_OPTION, SCORE, SEED, OneOf, read_option
@@ -126,6 +128,7 @@ class Evaluation:
         scenarios: One for each file of results.
         warnings: What the user should know.
         detection: Labels and predictions, for pictures.
+        benchmark: What the benchmark of the file's kind says of all frames; None for kinds that have none.
     """
 
     dataset: str
@@ -135,6 +138,7 @@ class Evaluation:
     scenarios: tuple[ScenarioEvaluation, ...]
     warnings: tuple[Diagnostic, ...]
     detection: Detection
+    benchmark: BenchmarkFigures | None
 
 
 def evaluate(
@@ -179,15 +183,18 @@ def evaluate(
     named: Mapping[str, Results] = (
         cast("Mapping[str, Results]", results) if isinstance(results, Mapping) else {_name_of(results): results}
     )
+    detected = predictions if isinstance(predictions, Predictions) else read_predictions(Path(predictions))
+    doubts = [
+        Diagnostic("predictions-doubtful", f"{detected.name}: {each}", severity="warning")
+        for each in find_doubts(detected)
+    ]
+    detection = detect(dataset, detected, missing)
     # a file's predictions are not kept here: what is evaluated of them is a copy
-    detection = detect(
-        dataset, predictions if isinstance(predictions, Predictions) else read_predictions(Path(predictions)), missing
-    )
+    del detected
     if least_score is None:
         least_score = float(detection.predictions.score.min(initial=0.0))
     rng = np.random.default_rng(seed)
     judge = _Judge(detection, distance_m, least_score, rng, margin, find_clusters(detection.frames, cluster))
-    doubts: list[Diagnostic] = []
     found: list[ScenarioEvaluation] = []
     for name, each in named.items():
         records = RecordStream(_records(each, doubts))
@@ -212,6 +219,7 @@ def evaluate(
         tuple(found),
         (*doubts, *_warnings(found, detection)),
         detection,
+        benchmark_figures(detection),
     )
 
 

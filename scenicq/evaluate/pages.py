@@ -123,6 +123,7 @@ class _Pages:
             "header",
             element("h1", "Detections on the frames that match"),
             element("p", escape(told)),
+            "" if found.benchmark is None else element("p", escape(found.benchmark.sentence), class_="hint"),
             element("ul", *warnings, class_="cause") if warnings else "",
         )
         sections = [part for each in found.scenarios for part in self._scenario(each)]

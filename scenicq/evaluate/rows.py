@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from scenicq.evaluate.benchmark import BenchmarkFigures
 from scenicq.evaluate.classes import ClassFigures
 from scenicq.evaluate.comparison import ObjectComparison, Share, p_text
 from scenicq.evaluate.controls import PLACES
@@ -112,6 +113,19 @@ def _figures(each: ClassFigures) -> dict[str, Any]:
     }
 
 
+def _benchmark(each: BenchmarkFigures) -> dict[str, Any]:
+    return {
+        "name": each.name,
+        "frames": each.frames,
+        each.measure: _number(each.score),
+        "mean_average_precision": _number(each.average_precision),
+        "mean_errors": {name: _number(value) for name, value in each.errors.items()},
+        "classes": each.classes,
+        "classes_without_labels": list(each.without_labels),
+        "sentence": each.sentence,
+    }
+
+
 def _slice(each: Slice) -> dict[str, Any]:
     others = None if each.other is None else _share(each.other)
     source = {"source": each.source} if each.source else {}
@@ -125,6 +139,7 @@ def evaluation_record(evaluation: Evaluation) -> dict[str, Any]:
         "predictions": evaluation.predictions,
         "found_within_m": evaluation.distance_m,
         "least_score": evaluation.least_score,
+        "benchmark": None if evaluation.benchmark is None else _benchmark(evaluation.benchmark),
         "scenarios": [_scenario(each) for each in evaluation.scenarios],
         "warnings": [each.message for each in evaluation.warnings],
     }
@@ -155,7 +170,12 @@ def _scenario(each: ScenarioEvaluation) -> dict[str, Any]:
 
 
 def flat_rows(evaluation: Evaluation) -> Iterator[dict[str, Any]]:
-    """One row a figure, with the keys of `COLUMNS`."""
+    """One row a figure, with the keys of `COLUMNS`; those of the benchmark are of no scenario."""
+    if evaluation.benchmark is not None:
+        whole = evaluation.benchmark
+        measures = {whole.measure: whole.score, "average_precision": whole.average_precision, **whole.errors}
+        for name, value in measures.items():
+            yield _row("", "benchmark", whole.name, measure=name, value=value)
     for one in evaluation.scenarios:
         for table, each in (*(("roles", role) for role in one.roles), ("all", one.all_objects)):
             yield _row(

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any, TypeVar
@@ -60,6 +61,7 @@ class _Results(msgspec.Struct):
     """nuScenes detection results, those of each sample left as they are written."""
 
     results: dict[str, msgspec.Raw]
+    meta: msgspec.Raw = msgspec.Raw(b"null")
 
 
 class _Object(msgspec.Struct, rename={"category": "class"}):
@@ -207,7 +209,7 @@ def _nuscenes(path: Path) -> Predictions:
             )
         except (msgspec.MsgspecError, ValueError, RecursionError) as error:
             raise _invalid(path, f"sample {sample}: {error}") from None
-    return gathered.predictions(path, NUSCENES)
+    return replace(gathered.predictions(path, NUSCENES), has_meta=bytes(whole.meta) != b"null")
 
 
 def _nuscenes_row(box: _Detection) -> tuple[_Number, ...]:

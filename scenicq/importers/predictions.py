@@ -48,9 +48,14 @@ class Protocol:
         velocity: Whether velocities are predicted.
         attributes: Groups of attributes, of which an object has one, that are predicted: `vehicle.parked`.
         no_attribute: Classes for which that error means nothing.
+        attribute_names: The attributes that the benchmark knows; any where it names none.
         spatial: Whether distances are those in space, not in the plane.
         roi_m: Metres from the drivable area up to which a corner of a box must lie for it to be evaluated, where the
             map has such an area.
+        scored: Classes over which the benchmark's own means go, with label objects or without; none where no benchmark
+            is meant.
+        measure: What the benchmark calls its score.
+        largest_errors: The error of a class of which nothing was found, by the name of the error, for those that count.
     """
 
     name: str
@@ -73,8 +78,12 @@ class Protocol:
     velocity: bool = True
     attributes: tuple[str, ...] = ()
     no_attribute: frozenset[str] = frozenset()
+    attribute_names: frozenset[str] = frozenset()
     spatial: bool = False
     roi_m: float = math.inf
+    scored: tuple[str, ...] = ()
+    measure: str = ""
+    largest_errors: Mapping[str, float] = field(default_factory=dict[str, float])
 
 
 NUSCENES = Protocol(
@@ -106,7 +115,17 @@ NUSCENES = Protocol(
     no_velocity=frozenset({"traffic_cone", "barrier"}),
     attributes=("cycle", "pedestrian", "vehicle"),
     no_attribute=frozenset({"traffic_cone", "barrier"}),
-)
+    attribute_names=frozenset({
+        "cycle.with_rider", "cycle.without_rider", "pedestrian.moving", "pedestrian.sitting_lying_down",
+        "pedestrian.standing", "vehicle.moving", "vehicle.parked", "vehicle.stopped",
+    }),
+    scored=(
+        "barrier", "bicycle", "bus", "car", "construction_vehicle", "motorcycle", "pedestrian", "traffic_cone",
+        "trailer", "truck",
+    ),
+    measure="NDS",
+    largest_errors=dict.fromkeys(("translation", "scale", "orientation", "velocity", "attribute"), 1.0),
+)  # fmt: skip
 """The nuScenes detection task (configuration `detection_cvpr_2019`)."""
 
 ARGOVERSE2 = Protocol(
@@ -122,7 +141,15 @@ ARGOVERSE2 = Protocol(
     velocity=False,
     spatial=True,
     roi_m=5.0,
-)
+    scored=(
+        "ARTICULATED_BUS", "BICYCLE", "BICYCLIST", "BOLLARD", "BOX_TRUCK", "BUS", "CONSTRUCTION_BARREL",
+        "CONSTRUCTION_CONE", "DOG", "LARGE_VEHICLE", "MESSAGE_BOARD_TRAILER", "MOBILE_PEDESTRIAN_CROSSING_SIGN",
+        "MOTORCYCLE", "MOTORCYCLIST", "PEDESTRIAN", "REGULAR_VEHICLE", "SCHOOL_BUS", "SIGN", "STOP_SIGN", "STROLLER",
+        "TRUCK", "TRUCK_CAB", "VEHICULAR_TRAILER", "WHEELCHAIR", "WHEELED_DEVICE", "WHEELED_RIDER",
+    ),
+    measure="CDS",
+    largest_errors={"translation": 2.0, "scale": 1.0, "orientation": math.pi},
+)  # fmt: skip
 """The Argoverse 2 detection task."""
 
 PLAIN = Protocol("interchange", tree=True)
@@ -150,6 +177,7 @@ class Predictions:
         attribute: Number of the attribute of each box, -1 without, shape (n,).
         of_ego: Whether boxes lie in the ego's own frame: x ahead, y to the left, z up, from the middle of the rear
             axle, and `heading` counts from the ego's.
+        has_meta: Whether the file says what the benchmark wants to know of the model, where it wants to.
     """
 
     name: str
@@ -171,6 +199,7 @@ class Predictions:
     attributes: list[str]
     attribute: NDArray[np.int8]
     of_ego: bool = False
+    has_meta: bool = True
 
     def taken(self, which: NDArray[np.bool_] | NDArray[np.int64]) -> Predictions:
         """Some of the boxes.

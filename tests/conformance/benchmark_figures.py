@@ -2,7 +2,8 @@
 
 `python benchmark_figures.py nuscenes DATAROOT VERSION SPLIT DETECTIONS` with nuscenes-devkit,
 `python benchmark_figures.py argoverse2 FOLDER LABELS DETECTIONS [all]` with av2; `all` leaves out no box for where it
-lies. Prints one JSON object: for each class its average precisions by centre distance, and its errors.
+lies. Prints one JSON object: for each class its average precisions by centre distance, and its errors; of nuScenes the
+totals, too. Those of av2 are rounded, and over classes of its own choice here.
 """
 
 from __future__ import annotations
@@ -23,11 +24,13 @@ def of_nuscenes(root: str, version: str, split: str, detections: str) -> dict[st
         labels = NuScenes(version=version, dataroot=root, verbose=False)
         given = DetectionEval(labels, config_factory("detection_cvpr_2019"), detections, split, work, verbose=False)
         told = given.evaluate()[0].serialize()
-    return {
+    found = {
         name: {f"{distance:g}": value for distance, value in precisions.items()}
         | {names[error]: value for error, value in told["label_tp_errors"][name].items()}
         for name, precisions in told["label_aps"].items()
     }
+    totals = {names[error]: value for error, value in told["tp_errors"].items()}
+    return {**found, "all classes": {"NDS": told["nd_score"], "mAP": told["mean_ap"], **totals}}
 
 
 def of_argoverse2(folder: str, labels: str, detections: str, *, everywhere: bool) -> dict[str, dict[str, float]]:

@@ -30,6 +30,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.feather as feather
 
+from scenicq.evaluate.benchmark import benchmark_figures
 from scenicq.evaluate.classes import class_figures
 from scenicq.evaluate.detection import detect
 from scenicq.importers.ingest import ingest
@@ -42,6 +43,9 @@ LARGEST = 1e-6
 SPLITS = ("mini_train", "mini_val")
 VALIDATION = frozenset({"scene-0103", "scene-0916"})
 """Of nuScenes mini; its other recordings are for training."""
+
+WHOLE = "all classes"
+"""What the benchmark's totals are called."""
 
 Figures = Mapping[str, Mapping[str, float]]
 
@@ -84,6 +88,8 @@ def ours(dataset: Dataset, file: Path, *, everywhere: bool = False) -> Figures:
         mine = found.setdefault(each.category, {})
         mine[f"{each.distance_m:g}"] = each.average_precision[0]
         mine |= {name: value for name, (value, _) in each.errors.items()}
+    if (whole := benchmark_figures(detection)) is not None:
+        found[WHOLE] = {whole.measure: whole.score, "mAP": whole.average_precision, **whole.errors}
     return found
 
 
@@ -103,7 +109,7 @@ def compared(title: str, mine: Figures, other: Figures, boxes: int) -> bool:
                 count, off = count + 1, abs(own - value)
             if not off <= worst:
                 worst, where = off, f", {name} {what}: {own} and {value}"
-    extra = {name for name in mine if name not in other}
+    extra = {name for name in mine if name not in other} - ({WHOLE} if WHOLE not in other else set())
     same = worst <= LARGEST and not extra and count > 0
     told = f"{title}: {count} figures of {len(mine)} classes, {boxes:,} boxes, at most {worst:.1e} off"
     print("equal " if same else "DIFFER", told + ("" if same else where) + "".join(sorted(extra)), flush=True)

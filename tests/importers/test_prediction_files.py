@@ -15,6 +15,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from scenicq.errors import DataError
+from scenicq.importers.prediction_checks import find_doubts
 from scenicq.importers.prediction_files import read_predictions
 
 BOX = {"class": "Car", "position": [3.0, 4.0], "heading": 0.5, "width": 2.0, "length": 4.0, "score": 0.75}
@@ -147,3 +148,41 @@ def test_missing_columns_are_named(tmp_path: Path) -> None:
     assert "`score`" in refused("file-invalid", tmp_path / "a.feather")
     pq.write_table(pa.table({"frame": ["a"], "class": ["Car"]}), tmp_path / "a.parquet")
     assert "`x`" in refused("file-invalid", tmp_path / "a.parquet")
+
+
+def scored(score: float, **given: Any) -> dict[str, Any]:
+    return detection(detection_score=score, **given)
+
+
+DOUBTFUL: dict[str, tuple[str, dict[str, Any]]] = {
+    "nothing": ("no box at all", {"a": [], "b": []}),
+    "one score": ("all scores are the same", {"a": [scored(0.5)], "b": [scored(0.5, translation=[9, 9, 1])]}),
+    "one box everywhere": (
+        "the same boxes are in all 3 frames",
+        {name: [scored(0.1 * number)] for number, name in enumerate(("a", "b", "c"), 1)} | {"d": []},
+    ),
+    "too many": (
+        "1 samples have more than 500 boxes",
+        {"a": [scored(n / 600, translation=[n, 0, 1]) for n in range(501)], "b": [scored(0.5)]},
+    ),
+    "an attribute": (
+        "no attributes called vehicle.flying",
+        {"a": [scored(0.5, attribute_name="vehicle.flying"), scored(0.4, attribute_name="vehicle.parked")]},
+    ),
+}
+
+
+@pytest.mark.parametrize("what", DOUBTFUL)
+def test_what_a_benchmark_refuses_and_what_is_no_model_is_told(tmp_path: Path, what: str) -> None:
+    told, results = DOUBTFUL[what]
+    found = list(find_doubts(read_predictions(nuscenes(tmp_path / "a.json", results))))
+    assert len(found) == 1
+    assert told in found[0]
+
+
+def test_files_without_meta_are_told(tmp_path: Path) -> None:
+    fine = {"a": [scored(0.5), scored(0.4, translation=[9, 9, 1])], "b": [scored(0.3)], "c": [scored(0.2)]}
+    assert list(find_doubts(read_predictions(nuscenes(tmp_path / "a.json", fine)))) == []
+    (tmp_path / "b.json").write_text(json.dumps({"results": fine}))
+    (told,) = find_doubts(read_predictions(tmp_path / "b.json"))
+    assert told.startswith("`meta`")
