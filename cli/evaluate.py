@@ -16,7 +16,7 @@ import click
 from scenicq.errors import DataError, Diagnostic, plain_json
 from scenicq.evaluate.clusters import CLUSTER_KEYS
 from scenicq.evaluate.comparison import MARGIN
-from scenicq.evaluate.detection import Missing
+from scenicq.evaluate.detection import DISTANCES, Missing
 from scenicq.evaluate.evaluation import Evaluation, Results
 from scenicq.evaluate.evaluation import evaluate as judge
 from scenicq.evaluate.pages import write_pages
@@ -66,8 +66,9 @@ _EXTENSIONS = {".json": "json"}
 @click.option("--predictions", metavar="FILE", type=click.Path(path_type=Path), required=True,
               help="Detections of a model: nuScenes results (.json), Argoverse 2 (.feather), or labels of the "
               "interchange format whose objects have a `score` (.jsonl or .parquet).")
-@click.option("--distance", metavar="M", type=click.Choice(["0.5", "1", "2", "4"]), default="2",
-              help="Centre distance within which an object counts as found: 0.5, 1, 2 or 4 metres.")
+@click.option("--distance", metavar="M[,CLASS=M]", type=OptionType(DISTANCES), default="2",
+              help="Centre distance within which an object counts as found: 0.5, 1, 2 or 4 metres; for some classes "
+              "another one: 2,pedestrian=0.5.")
 @click.option("--min-score", "least_score", metavar="S", type=OptionType(SCORE),
               help="Score from which a detection counts, but for average precision; all by default.")
 @click.option("--missing", type=click.Choice(["error", "empty", "skip"]), default="error",
@@ -89,9 +90,9 @@ _EXTENSIONS = {".json": "json"}
 @click.option("--report", metavar="DIR", type=click.Path(path_type=Path),
               help="Write a page with pictures, too, the worst frames first: DIR/index.html.")
 @SENSORS
-def evaluate(results: tuple[Path, ...], dataset: str, *, predictions: Path, distance: str, least_score: float | None,
-             missing: str, simulated: Path | None, cluster: str | None, margin: float, seed: int,
-             format_: str | None, output: Path | None, report: Path | None, sensors: Path | None) -> None:
+def evaluate(results: tuple[Path, ...], dataset: str, *, predictions: Path, distance: dict[str, float],
+             least_score: float | None, missing: str, simulated: Path | None, cluster: str | None, margin: float,
+             seed: int, format_: str | None, output: Path | None, report: Path | None, sensors: Path | None) -> None:
     # fmt: on
     """Say whether a model fails on the frames that match.
 
@@ -113,7 +114,7 @@ def evaluate(results: tuple[Path, ...], dataset: str, *, predictions: Path, dist
         {name: _asked(each, opened) for name, each in zip(names, results, strict=True)},
         opened,
         predictions,
-        distance_m=float(distance),
+        distance_m=distance,
         least_score=least_score,
         missing=cast("Missing", missing),
         simulated=simulated,
@@ -175,7 +176,7 @@ def _text(found: Evaluation) -> str:
         lines += [title, *columns([head, *rows]), ""]
     for each in found.scenarios:
         lines.append(f"{each.name}: {frame_counts(each)}")
-        for title, head, rows in tables(each, found.distance_m):
+        for title, head, rows in tables(each, found.within):
             lines += ["", title, *columns([head, *rows])]
         lines.append("")
         lines += [plain(one.sentence) for one in (*each.headline, *each.weighted)]

@@ -10,7 +10,7 @@ import math
 import numbers
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol
+from typing import Any, Literal, Protocol, cast
 
 from scenicq.errors import DataError, Diagnostic, similar
 
@@ -24,6 +24,7 @@ __all__ = [
     "WIDTH",
     "Amount",
     "Count",
+    "Distances",
     "Flag",
     "OneOf",
     "OptionKind",
@@ -184,6 +185,39 @@ class Text:
         if isinstance(value, bool) or not isinstance(value, (str, numbers.Real) if self.numeric else str):
             raise ValueError
         return value if isinstance(value, str) else repr(float(value))
+
+
+@dataclass(frozen=True, slots=True)
+class Distances:
+    """One of some distances, and others for some names: `2`, `2,pedestrian=0.5` or, in Python, `{"": 2}`.
+
+    Attributes:
+        known: The distances, metres.
+    """
+
+    known: tuple[float, ...]
+
+    @property
+    def expected(self) -> str:
+        """What is expected, for people."""
+        *first, last = (f"{each:g}" for each in self.known)
+        return f"{', '.join(first)} or {last} metres, and others for classes, such as {last},pedestrian={first[0]}"
+
+    def read(self, value: Any) -> dict[str, float]:
+        """The distance of each class that is named; that of the others, if one is said, under no name."""
+        given: dict[Any, Any] = {"": value}
+        if isinstance(value, Mapping):
+            given = dict(cast("Mapping[Any, Any]", value))
+        elif isinstance(value, str):
+            parts = [each.rpartition("=") for each in value.split(",")]
+            given = {name.strip(): text for name, _, text in parts}
+            if len(given) < len(parts):
+                raise ValueError
+        amount = Amount("m")
+        found = {str(name): amount.read(text) for name, text in given.items()}
+        if not found or not set(found.values()) <= set(self.known):
+            raise ValueError
+        return found
 
 
 HALF = Amount("m", 1.0, 1000.0)

@@ -19,10 +19,11 @@ from scenicq.evaluate.frame_of_reference import check_distance, check_fit
 from scenicq.evaluate.precision import ERRORS, Errors, box_errors
 from scenicq.evaluate.region_of_interest import RegionOfInterest
 from scenicq.importers.predictions import THRESHOLDS_M, Predictions, Protocol
+from scenicq.option_values import Distances
 from scenicq.store.classes import is_class
 from scenicq.store.dataset import Dataset
 
-__all__ = ["ERRORS_AT_M", "Detection", "Missing", "detect"]
+__all__ = ["DISTANCES", "ERRORS_AT_M", "Detection", "FoundWithin", "Missing", "detect"]
 
 Reals = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -34,8 +35,39 @@ Missing = Literal["error", "empty", "skip"]
 ERRORS_AT_M = 2.0
 """Centre distance of the pairs whose errors are told."""
 
+DISTANCES = Distances(THRESHOLDS_M)
+"""Centre distances within which objects count as found, as people say them."""
+_USUAL_M = 2.0
+
 _AT_ONCE = 200_000
 """Boxes that are compared at once: what lies between takes ten times their memory."""
+
+
+@dataclass(frozen=True, slots=True)
+class FoundWithin:
+    """Centre distances within which objects count as found, metres; each is one of `THRESHOLDS_M`.
+
+    Attributes:
+        usual: That of classes that have none of their own.
+        of_class: Those of some classes, by their names.
+    """
+
+    usual: float
+    of_class: Mapping[str, float]
+
+    @classmethod
+    def of(cls, said: Mapping[str, float]) -> FoundWithin:
+        """What `DISTANCES` reads."""
+        return cls(said.get("", _USUAL_M), {name: value for name, value in said.items() if name})
+
+    def metres(self, category: str) -> float:
+        """The distance of a class."""
+        return self.of_class.get(category, self.usual)
+
+    def __str__(self) -> str:
+        """In words."""
+        others = ", ".join(f"{name} {value:g} m" for name, value in self.of_class.items())
+        return f"{self.usual:g} m" + (f" ({others})" if others else "")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,6 +103,22 @@ class Detection:
     flat: bool
     distance: Reals
     score: Mapping[float, Reals]
+
+    def found_score(self, within: FoundWithin) -> Reals:
+        """The score with which each label object was found within the distance of its class, -inf where it was not."""
+        found = self.score[within.usual]
+        for number, name in enumerate(self.classes):
+            if name in within.of_class:
+                found = np.where(self.object_class == number, self.score[within.of_class[name]], found)
+        return found
+
+    def is_false(self, within: FoundWithin) -> Bools:
+        """Whether each prediction is no label object within the distance of its class."""
+        found = self.owner[within.usual] < 0
+        for number, name in enumerate(self.classes):
+            if name in within.of_class:
+                found = np.where(self.prediction_class == number, self.owner[within.of_class[name]] < 0, found)
+        return found
 
 
 def detect(dataset: Dataset, predictions: Predictions, missing: Missing = "error") -> Detection:

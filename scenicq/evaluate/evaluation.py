@@ -21,7 +21,7 @@ from scenicq.evaluate.classes import ClassFigures, class_figures
 from scenicq.evaluate.clusters import Clusters, find_clusters, parameters_of
 from scenicq.evaluate.comparison import MARGIN, ObjectComparison, compare
 from scenicq.evaluate.controls import Likeness, number_of
-from scenicq.evaluate.detection import Detection, Missing, detect
+from scenicq.evaluate.detection import DISTANCES, Detection, FoundWithin, Missing, detect
 from scenicq.evaluate.matched import Matched, read_matched
 from scenicq.evaluate.resampling import holm, resamples
 from scenicq.evaluate.simulation import Simulated, read_simulated, verdict
@@ -29,7 +29,7 @@ from scenicq.evaluate.slices import Slice, slices
 from scenicq.evaluate.weighting import Weighted, weigh
 from scenicq.importers.prediction_checks import find_doubts
 from scenicq.importers.prediction_files import read_predictions
-from scenicq.importers.predictions import THRESHOLDS_M, Predictions
+from scenicq.importers.predictions import Predictions
 from scenicq.option_values import MARGIN_OPTION, SCORE, SEED, OneOf, read_option
 from scenicq.query.execution.records import FrameRecord, IntervalRecord, Record, SummaryRecord, record, record_of
 from scenicq.query.execution.result_files import RecordStream, read_records
@@ -122,7 +122,7 @@ class Evaluation:
     Attributes:
         dataset: The dataset and its version, as `name_origin` says it.
         predictions: Name of the file.
-        distance_m: Centre distance within which an object counts as found.
+        within: Centre distances within which objects count as found.
         least_score: Score from which a prediction counts, but for average precision; 0, or that of the least, where
             all count.
         scenarios: One for each file of results.
@@ -133,7 +133,7 @@ class Evaluation:
 
     dataset: str
     predictions: str
-    distance_m: float
+    within: FoundWithin
     least_score: float
     scenarios: tuple[ScenarioEvaluation, ...]
     warnings: tuple[Diagnostic, ...]
@@ -146,7 +146,7 @@ def evaluate(
     dataset: Dataset,
     predictions: Predictions | Path | str,
     *,
-    distance_m: float = 2.0,
+    distance_m: float | str | Mapping[str, float] = 2.0,
     least_score: float | None = None,
     missing: Missing = "error",
     simulated: Path | str | None = None,
@@ -160,7 +160,8 @@ def evaluate(
         results: Of one scenario, or of several by their names.
         dataset: The dataset that the results are of.
         predictions: What the model has detected, or a file of it.
-        distance_m: Centre distance within which an object counts as found: 0.5, 1, 2 or 4.
+        distance_m: Centre distance within which an object counts as found: 0.5, 1, 2 or 4; for some classes another
+            one, such as "2,pedestrian=0.5" or {"": 2, "pedestrian": 0.5}.
         least_score: Score from which a prediction counts, but for average precision; all by default.
         missing: What a frame without predictions is: an error, a frame in which nothing was found, or left out.
         simulated: A CSV file of simulated runs; see `read_simulated`.
@@ -173,9 +174,7 @@ def evaluate(
         DataError: A file cannot be read or does not fit the others; option-invalid for another distance, or a score
             that is no number.
     """
-    if distance_m not in THRESHOLDS_M:
-        hint = f"known are {', '.join(f'{known:g}' for known in THRESHOLDS_M)}"
-        raise DataError(Diagnostic("option-invalid", f"no centre distance of {distance_m:g} m", hints=(hint,)))
+    within = FoundWithin.of(read_option("distance_m", DISTANCES, distance_m))
     seed, missing = read_option("seed", SEED, seed), read_option("missing", OneOf(get_args(Missing)), missing)
     least_score = None if least_score is None else read_option("least_score", SCORE, least_score)
     margin = read_option("margin", MARGIN_OPTION, margin)
@@ -191,10 +190,15 @@ def evaluate(
     detection = detect(dataset, detected, missing)
     # a file's predictions are not kept here: what is evaluated of them is a copy
     del detected
+    if strange := [name for name in within.of_class if name not in detection.classes]:
+        hint = f"there are {', '.join(detection.classes)}"
+        raise DataError(
+            Diagnostic("option-invalid", f"a distance of `{strange[0]}`, which is no class here", hints=(hint,))
+        )
     if least_score is None:
         least_score = float(detection.predictions.score.min(initial=0.0))
     rng = np.random.default_rng(seed)
-    judge = _Judge(detection, distance_m, least_score, rng, margin, find_clusters(detection.frames, cluster))
+    judge = _Judge(detection, within, least_score, rng, margin, find_clusters(detection.frames, cluster))
     found: list[ScenarioEvaluation] = []
     for name, each in named.items():
         records = RecordStream(_records(each, doubts))
@@ -214,7 +218,7 @@ def evaluate(
     return Evaluation(
         name_origin(dataset),
         detection.predictions.name,
-        distance_m,
+        within,
         least_score,
         tuple(found),
         (*doubts, *_warnings(found, detection)),
@@ -335,14 +339,14 @@ class _Judge:
     """Labels and predictions, ready to be divided by scenarios."""
 
     def __init__(
-        self, detection: Detection, distance_m: float, least: float, rng: np.random.Generator, margin: float,
+        self, detection: Detection, within: FoundWithin, least: float, rng: np.random.Generator, margin: float,
         clusters: Clusters,
     ) -> None:  # fmt: skip
-        self._detection, self._distance, self._least, self._rng = detection, distance_m, least, rng
+        self._detection, self._within, self._least, self._rng = detection, within, least, rng
         self._margin, self._clusters = margin, clusters
         objects = detection.objects
         self._counted = detection.object_class >= 0
-        score = detection.score[distance_m]
+        score = detection.found_score(within)
         self._missed = self._counted & ((score < least) | np.isneginf(score))
         self._weights = resamples(clusters.count, rng)
         self._parameters = parameters_of(detection.frames, clusters)
@@ -454,7 +458,7 @@ class _Judge:
         count = len(matching)
         lost = np.bincount(detection.objects.frame[mine & self._missed], minlength=count)
         of = np.bincount(detection.objects.frame[mine], minlength=count)
-        wrong = (detection.owner[self._distance] < 0) & (detection.predictions.score >= self._least)
+        wrong = detection.is_false(self._within) & (detection.predictions.score >= self._least)
         false = np.bincount(detection.frame[wrong], minlength=count)
         numbers = np.flatnonzero(matching)
         with np.errstate(invalid="ignore", divide="ignore"):

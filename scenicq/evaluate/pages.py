@@ -117,7 +117,7 @@ class _Pages:
         """All of it."""
         found = self._evaluation
         score = f", score {found.least_score:g} or more" if found.least_score else ""
-        told = f"{found.predictions} on {found.dataset}: found within {found.distance_m:g} m{score}"
+        told = f"{found.predictions} on {found.dataset}: found within {found.within}{score}"
         warnings = [element("li", escape(each.message)) for each in found.warnings]
         head = element(
             "header",
@@ -151,7 +151,7 @@ class _Pages:
             "missed": [_whiskers(one.share, one.other) for one in (*each.roles, each.all_objects)],
             "slices": [_whiskers(one.share, one.other) for one in each.slices],
         }
-        parts += [_table(shown, graphs.get(shown[0], ())) for shown in tables(each, self._evaluation.distance_m)]
+        parts += [_table(shown, graphs.get(shown[0], ())) for shown in tables(each, self._evaluation.within)]
         worst = each.worst[:SHOWN]
         links = [
             (

@@ -10,6 +10,7 @@ from scenicq.evaluate.benchmark import BenchmarkFigures
 from scenicq.evaluate.classes import ClassFigures
 from scenicq.evaluate.comparison import ObjectComparison, Share, p_text
 from scenicq.evaluate.controls import PLACES
+from scenicq.evaluate.detection import FoundWithin
 from scenicq.evaluate.evaluation import Evaluation, ScenarioEvaluation
 from scenicq.evaluate.precision import ERRORS
 from scenicq.evaluate.slices import Slice
@@ -137,7 +138,8 @@ def evaluation_record(evaluation: Evaluation) -> dict[str, Any]:
     return {
         "dataset": evaluation.dataset,
         "predictions": evaluation.predictions,
-        "found_within_m": evaluation.distance_m,
+        "found_within_m": evaluation.within.usual,
+        "found_within_m_of_class": dict(evaluation.within.of_class),
         "least_score": evaluation.least_score,
         "benchmark": None if evaluation.benchmark is None else _benchmark(evaluation.benchmark),
         "scenarios": [_scenario(each) for each in evaluation.scenarios],
@@ -264,8 +266,8 @@ def frame_counts(scenario: ScenarioEvaluation) -> str:
     return f"{told}, {undecided:,} {'is' if undecided == 1 else 'are'} undecided" if undecided else told
 
 
-def tables(scenario: ScenarioEvaluation, distance_m: float) -> list[Table]:
-    """What people look at: roles, classes at one centre distance, slices."""
+def tables(scenario: ScenarioEvaluation, within: FoundWithin) -> list[Table]:
+    """What people look at: roles, each class at its centre distance, slices."""
     found: list[Table] = [
         (
             "missed",
@@ -273,7 +275,7 @@ def tables(scenario: ScenarioEvaluation, distance_m: float) -> list[Table]:
             [_compared(each) for each in (*scenario.roles, scenario.all_objects)],
         )
     ]
-    classes = [each for each in scenario.classes if each.distance_m == distance_m]
+    classes = [each for each in scenario.classes if each.distance_m == within.metres(each.category)]
     errors = {(each.category, each.group): each.errors for each in scenario.classes if each.errors}
     told = [name for name in ERRORS if any(name in each for each in errors.values())]
     heads = (
@@ -297,7 +299,7 @@ def tables(scenario: ScenarioEvaluation, distance_m: float) -> list[Table]:
         )
         for each in sorted(classes, key=lambda each: each.category)
     ]
-    found.append((f"classes, found within {distance_m:g} m, errors within 2 m", heads, rows))
+    found.append((f"classes, found within {within}, errors within 2 m", heads, rows))
     cut = [
         (
             each.title,

@@ -59,7 +59,7 @@ class Judgement:
     def _repr_html_(self) -> str:
         parts = [f"<p>{escape(sentence)}</p>" for sentence in self.sentences]
         for each in self.evaluation.scenarios:
-            for title, head, rows in tables(each, self.evaluation.distance_m):
+            for title, head, rows in tables(each, self.evaluation.within):
                 lines = "".join(_line("td", row) for row in rows)
                 parts.append(f"<table><caption>{escape(title)}</caption>{_line('th', head)}{lines}</table>")
         return "".join(parts)

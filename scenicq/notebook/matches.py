@@ -345,7 +345,7 @@ class Matches(Sequence[FrameResult]):
         self,
         predictions: str | Path,
         *,
-        distance_m: float = 2.0,
+        distance_m: float | str | Mapping[str, float] = 2.0,
         least_score: float | None = None,
         missing: Missing = "error",
         simulated: str | Path | None = None,
@@ -357,7 +357,8 @@ class Matches(Sequence[FrameResult]):
 
         Args:
             predictions: A file of what the model has detected.
-            distance_m: Centre distance within which an object counts as found: 0.5, 1, 2 or 4.
+            distance_m: Centre distance within which an object counts as found: 0.5, 1, 2 or 4; for some classes
+                another one, such as "2,pedestrian=0.5" or {"": 2, "pedestrian": 0.5}.
             least_score: Score from which a prediction counts; all by default.
             missing: What a frame without predictions is; see `scenicq.evaluate.evaluation.evaluate`.
             simulated: A CSV file of simulated runs.

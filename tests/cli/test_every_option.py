@@ -31,7 +31,7 @@ NEEDED = {"predictions": "missing.json"}
 FITTING = {
     "shard": "1/2", "engine": "dask", "export": "paths out", "enforce": "none", "waive": "collision", "sensors": ".",
     "maps": "a.geojson",
-    "tolerance": "0.3", "margin": "0.1", "program": "ego = new Car", "format_": "nuscenes",
+    "tolerance": "0.3", "margin": "0.1", "distance": "1", "program": "ego = new Car", "format_": "nuscenes",
 }  # fmt: skip
 """Values of options whose kind is not told by their type."""
 

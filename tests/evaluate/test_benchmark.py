@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from scenicq.evaluate.benchmark import benchmark_figures
-from scenicq.evaluate.detection import detect
+from scenicq.evaluate.detection import DISTANCES, FoundWithin, detect
 from scenicq.importers.predictions import ARGOVERSE2, NUSCENES, PLAIN, Predictions, Protocol
 from scenicq.store.dataset import Dataset, open_dataset
 from scenicq.store.labels import Label, LabelObject, OutOfPlane, Recording
@@ -92,3 +92,25 @@ def test_what_is_found_a_metre_off_and_turned(dataset, protocol):
 @pytest.mark.parametrize("protocol", [PLAIN], ids=["interchange"])
 def test_labels_of_the_interchange_format_have_none(dataset, protocol):
     assert benchmark_figures(detect(dataset, found_boxes(protocol, (0, 1), 0.0, 0.0))) is None
+
+
+def test_a_class_may_have_a_distance_of_its_own(dataset, protocol):
+    car, person = NAMES.get(protocol.name, ("", ""))
+    found = detect(dataset, found_boxes(protocol, (0, 1), 0.75, 0.0))
+    assert found.classes.index(car) != found.classes.index(person)
+    for said, missed in (
+        ("2", set()),
+        ("0.5", {car, person}),
+        (f"2,{person}=0.5", {person}),
+        ({"": 0.5, car: 4}, {person}),
+    ):
+        within = FoundWithin.of(DISTANCES.read(said))
+        lost = {found.classes[n] for n in found.object_class[np.isneginf(found.found_score(within))]}
+        false = {found.classes[n] for n in found.prediction_class[found.is_false(within)]}
+        assert lost == false == missed, said
+
+
+@pytest.mark.parametrize("said", ["3", "2,", "2,car=3", "car=2,car=1", "=", "nan", {}, {"car": "x"}, None, True])
+def test_what_is_no_distance(said):
+    with pytest.raises((ValueError, OverflowError)):
+        DISTANCES.read(said)
