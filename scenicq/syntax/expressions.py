@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from bisect import bisect_right
 from typing import Literal, Self, cast
 
@@ -27,6 +28,7 @@ from scenicq.syntax.tokens import CLOSERS, Token
 
 __all__ = ["ExpressionParser"]
 
+_JOINED = re.compile(r"\\(?:\r\n|\r|\n)")
 _SIGNS = ("-", "+", "~")
 _AFTER_VISIBLE = INFIX_NAMES | {"(", "[", "{", *_SIGNS}
 """With these an operand starts after `visible`, which is then no name."""
@@ -468,6 +470,8 @@ class ExpressionParser(Cursor):
         """Read the specifiers of an instance of the class."""
         specifiers: list[ast.Specifier] = []
         temporal, self.temporal = self.temporal, False
+        if keyword and self.opens_block():
+            self.advance()
         if self.starts_specifier(self.index) or (self.token.text and not keyword):
             specifiers.append(self.specifier())
         elif self.token.kind == "name" and self.starts_operand(self.index):
@@ -487,6 +491,21 @@ class ExpressionParser(Cursor):
         if several_lines and self.text == "," and self.peek().kind == "newline":
             self.advance()
         return ast.New(span, cls, tuple(specifiers), keyword)
+
+    def opens_block(self) -> bool:
+        """Whether a comma right after the class, outside brackets, puts all its specifiers on the lines below."""
+        if self.text != "," or not self.starts_specifier(self.index + 1):
+            return False
+        comma, following = self.token, self.peek()
+        between = _JOINED.sub("", self.source.text[comma.end : following.start])
+        if "\n" not in between and "\r" not in between:
+            return False
+        depth, index = 0, self.index
+        while index and depth <= 0 and self.tokens[index - 1].kind not in ("newline", "indent", "dedent"):
+            index -= 1
+            text = self.tokens[index].text
+            depth += (text in CLOSERS) - (text in CLOSERS.values())
+        return depth <= 0
 
     def is_unknown(self) -> bool:
         """Whether two words side by side can only be a misspelt specifier."""

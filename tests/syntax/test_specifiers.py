@@ -108,6 +108,9 @@ LINES = [
     "ego = new Car at x,  # first\n\n      # alone\n    facing 3 deg,\n  with a 1\nnext_one = 2",
     "ego = (new Car at x,\nfacing 3 deg,\nwith a 1)\nnext_one = 2",
     "ego = new Car at x,\r\n    facing 3 deg,\r\n    with a 1\r\nnext_one = 2\r\n",
+    "ego = new Car,\n    at x,\n    facing 3 deg,\n    with a 1\nnext_one = 2\n",
+    "ego = new Car,  # first\n\n      # alone\n    at x, facing 3 deg,\n    with a 1,\nnext_one = 2\n",
+    "ego = new Car,\r\n    at x,\r\n    facing 3 deg,\r\n    with a 1\r\nnext_one = 2\r\n",
 ]
 
 
@@ -118,9 +121,17 @@ def test_specifiers_on_several_lines(text: str) -> None:
     assert shape(second) == "Assign([next_one], 2)"
 
 
-def test_specifiers_on_several_lines_inside_a_block() -> None:
-    node = statement("for i in a:\n    new Car at x,\n        facing y\n    b\n")
-    assert shape(node) == "For(i, a, [New(Car, [<at x>, <facing y>], True), b])"
+@pytest.mark.parametrize("first", ["at x,", ",\n        at x,"])
+def test_specifiers_on_several_lines_inside_a_block(first: str) -> None:
+    node = statement(f"for i in f(a):\n    new Car {first}\n        facing y\n    b\n")
+    assert shape(node) == "For(i, f(a), [New(Car, [<at x>, <facing y>], True), b])"
+
+
+@pytest.mark.parametrize(
+    "text", ["new Car, with a 1", "new Car, \\\n  with a 1", "(new Car,\n  with a 1)", "f(b, [new Car,\n  with a 1])"]
+)
+def test_a_comma_after_the_class_is_of_the_instance_only_at_the_end_of_a_line_outside_brackets(text: str) -> None:
+    assert error(f"x = {text}\n").startswith("error[parse-error]")
 
 
 def test_the_span_of_an_instance_ends_before_a_trailing_comma() -> None:
