@@ -34,7 +34,10 @@ _LEFT = (
 )
 _RIGHT = _LEFT.replace("> 0", "< 0").replace("left of", "right of")
 _INSIDE = "`X in R` asks whether the box of X lies in a region, `X.position in R` its centre alone"
-_TOWARD = "`abs((angle from X to Y) - X.heading) < 20 deg` asks whether X faces Y; `facing toward Y` turns a new object"
+_TOWARD = (
+    "`abs(relative heading of (angle from X to Y) from X) < 20 deg` asks whether X faces Y; "
+    "`facing toward Y` turns a new object"
+)
 _SEES = "`X can see Y` asks whether Y is in view"
 _OVER_TIME = "`require (A) until (B)` and `eventually (A and next (eventually B))` say what comes after what"
 _BEYOND = (
