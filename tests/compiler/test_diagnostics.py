@@ -128,6 +128,10 @@ def hints_of(text):
         ("third = new Car facing west", "`90 deg`"),
         ("third = new Junction", "`on intersection`"),
         ("third = new Pedestrian on network.sidewalks", "`Uniform(*elements)`"),
+        (
+            "require (distance from ego to [network.lanes[0], network.lanes[1], Uniform(*network.lanes)]) < 5",
+            "chooses one",
+        ),
         ("third = new Car with brand 'a' at ego offset by 2 @ 3", "a comma separates specifiers"),
         ("zebras = network.crosswalks", "`crossings` is what Scenic calls them"),
         ("long = [each for each in network.roads if each.extent > 3]", "`centerline`"),
