@@ -81,11 +81,13 @@ def networks_of(
 def _told(scenario: Scenario) -> str:
     roles = ", ".join(f"{owner.name}: {owner.category}" for owner in scenario.objects)
     written = sum(requirement.built_in is None for requirement in scenario.requirements)
+    over_time = len(scenario.dynamics.requirements) if scenario.dynamics is not None else 0
+    timed = f" and {over_time} over time" if over_time else ""
     soft = f" and {len(scenario.soft)} soft" if scenario.soft else ""
     recorded = f", {count(len(scenario.records), 'recorded value')}" if scenario.records else ""
     return (
         f"ok on map {scenario.map}: {count(len(scenario.objects), 'object')} ({roles}), "
-        f"{count(written, 'requirement')}{soft}{recorded}, read as Scenic {scenario.version}"
+        f"{count(written, 'requirement')}{timed}{soft}{recorded}, read as Scenic {scenario.version}"
     )
 
 

@@ -105,8 +105,6 @@ _VELOCITY = re.compile(r"(?<![\w.])([\w.]+)\.velocity\b")
 
 def _need(value: ModelValue, what: str, span: Span | None) -> Exception:
     shown = describe(value)
-    if is_node(value):
-        shown = {"other": "a value", "boolean": "a truth value"}.get(kind_of(value), f"a {kind_of(value)}")
     hints: tuple[str, ...] = ()
     if isinstance(value, tuple) and len(cast("tuple[ModelValue, ...]", value)) == 2 and "number" in what:
         hints = ("`Range(a, b)` is a random number of an interval; only Scenic 1 spells it `(a, b)`: `--scenic 1`",)
@@ -114,6 +112,10 @@ def _need(value: ModelValue, what: str, span: Span | None) -> Exception:
         hints = (f"`{vector[1]}.speed` is a number",)
     elif what == "a condition" and span is not None and (hint := condition_hint(span.text.split(None, 1)[0])):
         hints = (hint,)
+    elif isinstance(value, list | tuple) and any(kind_of_model(each) == "region" for each in value):
+        hints = ("`Uniform(*elements)` chooses one of several",)
+    elif isinstance(value, str) and what == "a vector field" and span is not None and " at " in span.text:
+        hints = ("`at` after a value is the direction of a field there; a comma separates specifiers",)
     return fail("wrong-type", f"{what} is needed here, not {shown}", span, f"this is {shown}", hints)
 
 
@@ -203,6 +205,8 @@ def to_vector(value: ModelValue, span: Span | None) -> Node:
         return to_vector(property_node(value, "position", span), span)
     if isinstance(value, tuple | list):
         parts = list(cast("tuple[ModelValue, ...]", value))
+        if any(kind_of_model(each) == "region" for each in parts):
+            raise _need(value, "a vector", span)
         flat = len(parts) == 3 and parts[2] in (0, 0.0)
         if len(parts) == 3 and not flat:
             raise fail("unsupported-construct", "a position with a height is not supported: labels are matched in 2D",

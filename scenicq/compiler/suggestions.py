@@ -6,12 +6,9 @@ Words around which the parser cannot go on are in `scenicq.syntax.hints`.
 from __future__ import annotations
 
 import re
-from typing import cast
 
-from scenicq.compiler.values import Instance, ModelValue, describe, fail, is_node
+from scenicq.compiler.values import Instance, ModelValue, Module, describe, fail, is_node
 from scenicq.errors import ScenarioError, Span, similar
-from scenicq.forest.kinds import kind_of
-from scenicq.forest.nodes import Node
 from scenicq.geometry.elements import Lane, NetworkElement
 from scenicq.geometry.network import Network
 from scenicq.syntax.hints import BIKE_LANES, MOVES, STANDS, TURNS
@@ -88,6 +85,12 @@ _SYNONYMS = {
     "SchoolBus": "Bus", "SUV": "Car", "Taxi": "Car", "Pickup": "Car", "Bollard": "Barrier",
 }  # fmt: skip
 """What people call what the driving model has."""
+_OF_MAP = {
+    "Crosswalk": "crossing", "Crossing": "crossing", "Intersection": "intersection", "Junction": "intersection",
+    "Lane": "lane", "Road": "road", "Sidewalk": "sidewalk", "ParkingSpot": "shoulder",
+}  # fmt: skip
+"""What people make an object of and is a part of the map, by the region there."""
+_COMPASS = {"north": 0, "west": 90, "south": 180, "east": -90}
 _OF_SIGNS = "labels of signs are of class `Prop`"
 _BY_NAME = {
     "Sign": _OF_SIGNS, "StopSign": _OF_SIGNS, "TrafficSign": _OF_SIGNS,
@@ -100,6 +103,12 @@ _BY_NAME = {
     "rightLane": "`X.laneSection.laneToRight` is the lane right of X's",
     "weather": "`param weather = 'rain'` compares what labels say of the weather",
     "time": "`param time = 12` compares what labels say of the time",
+    "intersects": "`X intersects Y` asks whether the boxes of two overlap",
+    "random": "`Uniform(a, b)` chooses, `Range(a, b)` draws a number",
+    "Offset": "`at X offset by 2 @ 5` is 2 m to the right and 5 m ahead of X",
+    "Weather": "`param weather = 'rain'` compares what labels say of the weather",
+    **{name: f"`on {region}` places an object there" for name, region in _OF_MAP.items()},
+    **{name: f"a direction is an angle, to the left of north: `{angle} deg`" for name, angle in _COMPASS.items()},
     "self": "`self` stands in classes alone; `require` after the object asks of it by its name",
 }  # fmt: skip
 """How the driving model says what people say with another name."""
@@ -119,6 +128,8 @@ _BY_ATTRIBUTE = {
     "distance": "`distance from ego to X` is the distance",
 }  # fmt: skip
 """How Scenic says what people ask an object for, by the attribute in small letters."""
+_ASIDE = re.compile(r"^_|At$|Region$")
+"""Attributes of the map that are not listed to who looks for one: look-ups and regions, each of which has a twin."""
 _OWNER = re.compile(r"([A-Za-z_][\w.]{0,60})\.\Z")
 """The dotted name before an attribute."""
 
@@ -152,7 +163,11 @@ def unknown_name(name: str, known: set[str], region: str | None, span: Span) -> 
 def unknown_attribute(value: ModelValue, name: str, known: set[str], place: str, span: Span) -> ScenarioError:
     """What is said of an attribute that a value does not have; `place` is what the network calls it at a point."""
     is_thing = isinstance(value, Instance)
-    shown = f"a {kind_of(cast(Node, value))}" if is_node(value) else describe(value)
+    shown = describe(value)
+    if isinstance(value, Module) and value.name == "globalParameters":
+        close = similar(name, known)
+        hints = (f"`{close}` is spelled nearly like it",) if close else (f"`param {name} = ...` sets it",)
+        return fail("unknown-attribute", f"the program has no parameter `{name}`", span, "not set", hints)
     message, label = f"{shown} has no attribute `{name}`", "not found"
     if is_thing and place:
         return fail("unknown-attribute", message, span, label, (f"`network.{place}(...)` says what lies at any point",))
@@ -166,6 +181,10 @@ def unknown_attribute(value: ModelValue, name: str, known: set[str], place: str,
         return fail("unknown-attribute", message, span, label, (hint,))
     close = similar(name, known)
     hints = (f"`{close}` is an attribute with a similar name",) if close else ()
+    if isinstance(value, Network | NetworkElement) and not close:
+        called = f"{_SYNONYMS.get(name, '')}s"
+        has = ", ".join(f"`{each}`" for each in sorted(known) if not _ASIDE.search(each))
+        hints = (f"`{called}` is what Scenic calls them",) if called in known else (f"it has {has}",)
     if isinstance(value, Network) and name in ("bikeLanes", "bikeLane", "bicycleLanes"):
         hints = (BIKE_LANES,)
     if is_thing and (said := _BY_ATTRIBUTE.get(name.replace("_", "").lower())):

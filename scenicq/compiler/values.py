@@ -6,11 +6,13 @@ region), or one of the classes below. Nothing here evaluates syntax.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
 from scenicq.errors import Diagnostic, Note, ScenarioError, Span
+from scenicq.forest.kinds import kind_of
 from scenicq.forest.nodes import Identity, Index, Node
 from scenicq.syntax import ast
 
@@ -296,8 +298,17 @@ _NAMES: dict[type, str] = {
 }
 
 
+_KINDS = {"boolean": "a truth value", "other": "a value"}
+"""What values of a forest are called whose kind has another name."""
+
+
 def describe(value: ModelValue) -> str:
     """What a value is, in words for a message."""
     if isinstance(value, Instance):
         return f"an instance of `{value.cls.name}`"
-    return _NAMES.get(type(value)) or f"a {type(value).__name__}"
+    if is_node(value):
+        return _KINDS.get(kind_of(value)) or f"a {kind_of(value)}"
+    name = type(value).__name__
+    if type(value).__module__.startswith("scenicq.compiler"):
+        name = re.sub(r"(?<!^)(?=[A-Z])", " ", name).lower()
+    return _NAMES.get(type(value)) or f"a {name}"

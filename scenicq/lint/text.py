@@ -1,29 +1,42 @@
-"""What the text of a program alone gives away: angles without `deg`, reversed ranges, names that nothing uses."""
+"""What the text of a program alone gives away: what asks nothing, reversed ranges, names that nothing uses."""
 
 from __future__ import annotations
 
-import itertools
-import math
+import re
 from collections.abc import Iterable, Iterator
 from functools import cache
 
 from scenicq.compiler.models import library_texts
 from scenicq.compiler.roots import root_classes
-from scenicq.errors import Diagnostic, Span, similar
+from scenicq.errors import Diagnostic, similar
+from scenicq.lint.measured import lint_measured
+from scenicq.lint.terms import (
+    ANGLE_PROPERTIES,
+    ORDERS,
+    Values,
+    compared,
+    is_angle,
+    links,
+    number,
+    set_once,
+    terms,
+    warning,
+    written,
+)
 from scenicq.syntax import ast, phrases
-from scenicq.syntax.walk import children, walk
+from scenicq.syntax.walk import walk
 
 __all__ = ["lint_text"]
 
 _FASTEST_MPS = 45.0
 """What few vehicles on roads reach: the most that Scenic's own vehicles drive."""
-_FULL_TURN = math.tau * (1 + 1e-9)
-_ANGLE_PROPERTIES = frozenset({"heading", "yaw", "roadDeviation", "viewAngle", "parentOrientation"})
 _MEASURED = frozenset({"speed", "width", "length", "height", "x", "y", "acceleration", "angularSpeed"})
-_ORDERS = frozenset({"<", "<=", ">", ">=", "==", "!="})
+_SPEEDS_ELSEWHERE = re.compile(r"\b(km/?h|kmph|kph|mph)\b", re.IGNORECASE)
+_SPEEDS_HERE = re.compile(r"\bm(/s|ps\b)|met(er|re)s? (a|per) second", re.IGNORECASE)
+_DIGITS = re.compile(r"\d+(\.\d+)?")
+_IN_METRES_A_SECOND = {"mph": " * 0.447"}
 _RANGES = frozenset({"Range", "DiscreteRange", "TruncatedNormal"})
 _VIEW = frozenset({"visibleDistance", "viewAngle", "viewAngles", "viewDistance"})
-_POINTS = frozenset({"Point", "OrientedPoint"})
 _READ_BY_MODELS = frozenset({"ego", "workspace", "simulation", "simulator", "_"})
 _OF_SCENIC = frozenset({
     "viewAngles", "orientationStdDev", "angularVelocity", "baseOffset", "onDirection", "visionSensorOffset",
@@ -31,10 +44,6 @@ _OF_SCENIC = frozenset({
     "viewRayDensity", "viewRayCount", "viewRayDistanceScaling", "showVisibleRegion", "sensors", "render",
 })  # fmt: skip
 """Properties that Scenic's own classes have, and that say nothing of a box in the plane."""
-
-
-def _warning(code: str, message: str, span: Span, label: str, *hints: str) -> Diagnostic:
-    return Diagnostic(code, message, span, label, hints=hints, severity="warning")
 
 
 def lint_text(body: tuple[ast.Statement, ...], *, properties: bool) -> Iterator[Diagnostic]:
@@ -45,162 +54,21 @@ def lint_text(body: tuple[ast.Statement, ...], *, properties: bool) -> Iterator[
         properties: Whether properties that no class has are named, too; with a dataset its labels say more.
     """
     nodes = list(walk(*body))
+    values = set_once(body, nodes)
     for node in nodes:
-        yield from _angles(node)
         yield from _range(node)
         yield from _exact(node)
         yield from _alone(node)
         yield from _two(node)
-        yield from _fast(node)
-    yield from _signed(nodes)
+        yield from _speeds(node, values)
+        yield from _truths(node)
+        yield from _units(node)
+    yield from lint_measured(nodes, values)
     yield from _egos(body)
     yield from _unseen(nodes)
-    yield from _facing_objects(nodes)
     yield from _unused(nodes)
     if properties:
         yield from _unknown_properties(nodes)
-
-
-# --- angles
-
-
-def _number(node: ast.SyntaxNode) -> float | None:
-    """The value of a number that the text says outright."""
-    match node:
-        case ast.LiteralValue(value=bool()):
-            return None
-        case ast.LiteralValue(value=int() | float() as value):
-            return float(value)
-        case ast.UnaryOp(operator="-" | "+" as sign):
-            inner = _number(node.operand)
-            return None if inner is None else -inner if sign == "-" else inner
-        case ast.Phrase(row=phrases.DEG):
-            inner = _number(node.given[0])
-            return None if inner is None else math.radians(inner)
-        case _:
-            return None
-
-
-def _terms(node: ast.SyntaxNode) -> Iterator[ast.SyntaxNode]:
-    """The numbers that an expression of an angle is made of, down to those with `deg`."""
-    stack = [node]
-    while stack:
-        each = stack.pop()
-        if _number(each) is not None:
-            yield each
-            continue
-        match each:
-            case ast.UnaryOp() | ast.Phrase(row=phrases.RELATION) | ast.IfElse() | ast.Tuple():
-                stack.extend(reversed(tuple(children(each))))
-            case ast.BinaryOp(operator="+" | "-"):
-                stack += [each.right, each.left]
-            case ast.Call(function=ast.Name(id="Range" | "Uniform" | "DiscreteRange" | "Normal" | "abs")):
-                stack += [argument.value for argument in reversed(each.arguments)]
-            case _:
-                pass
-
-
-def _is_angle(node: ast.SyntaxNode) -> bool:
-    match node:
-        case ast.Attribute(name=name):
-            return name in _ANGLE_PROPERTIES
-        case ast.UnaryOp(operator="-" | "+"):
-            return _is_angle(node.operand)
-        case ast.BinaryOp(operator="+" | "-"):
-            return _is_angle(node.left) or _is_angle(node.right)
-        case ast.Call(function=ast.Name(id="abs" | "min" | "max")):
-            return any(_is_angle(argument.value) for argument in node.arguments)
-        case _:
-            return isinstance(node, ast.Phrase) and node.row.measures == "angle"
-
-
-def _links(chain: ast.ComparisonChain) -> Iterator[tuple[ast.SyntaxNode, str, ast.SyntaxNode]]:
-    """The comparisons of a chain, each with both sides."""
-    sides = [chain.left, *(each.right for each in chain.comparisons)]
-    for (left, right), link in zip(itertools.pairwise(sides), chain.comparisons, strict=True):
-        yield left, link.operator, right
-
-
-def _compared(chain: ast.ComparisonChain) -> list[ast.SyntaxNode]:
-    """The sides of a chain that are compared by order or equality."""
-    return [chain.left, *(each.right for each in chain.comparisons if each.operator in _ORDERS)]
-
-
-def _order_of(chain: ast.ComparisonChain) -> Iterator[tuple[ast.SyntaxNode, ast.SyntaxNode]]:
-    """Which sides of a chain are to be below which others."""
-    for left, operator, right in _links(chain):
-        if operator in ("<", "<="):
-            yield left, right
-        elif operator in (">", ">="):
-            yield right, left
-
-
-def _angles(node: ast.SyntaxNode) -> Iterator[Diagnostic]:
-    """Numbers of more than a full turn where an angle stands."""
-    places: list[ast.SyntaxNode] = []
-    match node:
-        case ast.Phrase():
-            places += node.of_kind("heading")
-        case ast.WithSpecifier(property=name) if name in _ANGLE_PROPERTIES:
-            places = [node.value]
-        case ast.PropertyDefault(name=name) if name in _ANGLE_PROPERTIES:
-            places = [node.value]
-        case ast.ComparisonChain():
-            sides = _compared(node)
-            if any(map(_is_angle, sides)):
-                places = [side for side in sides if not _is_angle(side)]
-        case _:
-            pass
-    for place in places:
-        for term in _terms(place):
-            value = _number(term)
-            if value is not None and abs(value) > _FULL_TURN and not ast.is_phrase(term, phrases.DEG):
-                text = term.span.text
-                yield _warning(
-                    "angle-without-deg", f"`{text}` is an angle of {abs(value) / math.tau:.1f} full turns", term.span,
-                    "angles are in radians", f"write `{text} deg` for degrees",
-                )  # fmt: skip
-
-
-def _facing_objects(nodes: list[ast.SyntaxNode]) -> Iterator[Diagnostic]:
-    """Objects where a heading stands: their own heading is taken, not the direction to them."""
-    objects = {"ego"}
-    for node in nodes:
-        match node:
-            case ast.Assign(value=ast.New(cls=ast.Name(id=cls))) if cls not in _POINTS:
-                objects |= {target.id for target in node.targets if isinstance(target, ast.Name)}
-            case _:
-                pass
-    for node in nodes:
-        match node:
-            case ast.Phrase(row=phrases.FACING, operands=(ast.Name(id=name) as heading,)) if name in objects:
-                yield _warning(
-                    "facing-object", f"`facing {name}` is the direction in which `{name}` itself faces", heading.span,
-                    "taken for its heading", f"`facing toward {name}` turns to it",
-                    f"`facing {name}.heading` says that its heading is meant",
-                )  # fmt: skip
-            case _:
-                pass
-
-
-def _signed(nodes: list[ast.SyntaxNode]) -> Iterator[Diagnostic]:
-    """Angles that are bounded from above alone, by an amount: they may be as far to the right as they like."""
-    pairs = [(node, *each) for node in nodes if isinstance(node, ast.ComparisonChain) for each in _order_of(node)]
-    bounded_below = {_text(high) for _, _, high in pairs}
-    for node, angle, end in pairs:
-        most = _number(end)
-        if isinstance(angle, ast.Phrase) and _is_angle(angle) and most is not None and 0 < most < math.pi:
-            text = _text(angle)
-            if text not in bounded_below:
-                yield _warning(
-                    "angle-without-abs", f"`{text}` is negative to the right, so every angle to the right is below "
-                    f"{_text(end)}", node.span, "bounds one side alone",
-                    f"`abs({text}) < {_text(end)}` bounds both sides",
-                )  # fmt: skip
-
-
-def _text(node: ast.SyntaxNode) -> str:
-    return " ".join(node.span.text.split())
 
 
 # --- statements
@@ -221,9 +89,9 @@ def _is_condition(node: ast.SyntaxNode) -> bool:
 def _alone(node: ast.SyntaxNode) -> Iterator[Diagnostic]:
     """Conditions that are a statement of their own."""
     if isinstance(node, ast.ExpressionStatement) and _is_condition(node.value):
-        yield _warning(
+        yield warning(
             "condition-alone", "this condition asks nothing: no `require` stands before it", node.span,
-            "is worked out and forgotten", f"write `require {_text(node)}`",
+            "is worked out and forgotten", f"write `require {written(node)}`",
         )  # fmt: skip
 
 
@@ -236,7 +104,7 @@ def _egos(body: tuple[ast.Statement, ...]) -> Iterator[Diagnostic]:
     ]  # fmt: skip
     for each in made[1:]:
         line = made[0].span.source.position(made[0].span.start)[0]
-        yield _warning(
+        yield warning(
             "ego-twice", f"the ego of line {line} is an object of the scene, too", each.span, "is the ego from here on",
             "give one of the two another name",
         )  # fmt: skip
@@ -246,12 +114,12 @@ def _two(node: ast.SyntaxNode) -> Iterator[Diagnostic]:
     """`Uniform` of two numbers on both sides of 0: a range through 0 may be meant."""
     match node:
         case ast.Call(function=ast.Name(id="Uniform"), arguments=(first, second)):
-            low, high = (_number(each.value) for each in (first, second))
+            low, high = (number(each.value) for each in (first, second))
             if low is not None and high is not None and low < 0 < high and (low, high) != (-1, 1):
                 if any(ast.is_phrase(each.value, phrases.DEG) for each in (first, second)):
                     return
                 one, other = (each.value.span.text for each in (first, second))
-                yield _warning(
+                yield warning(
                     "choice-of-two", f"this is {one} or {other}, and nothing between", node.span, "one of two numbers",
                     f"`Range({one}, {other})` is all between them",
                 )  # fmt: skip
@@ -259,27 +127,73 @@ def _two(node: ast.SyntaxNode) -> Iterator[Diagnostic]:
             pass
 
 
-def _fast(node: ast.SyntaxNode) -> Iterator[Diagnostic]:
-    """Speeds above what roads see."""
+def _truths(node: ast.SyntaxNode) -> Iterator[Diagnostic]:
+    """Truth values in an order: as numbers they are 0 and 1."""
+    if not isinstance(node, ast.ComparisonChain):
+        return
+    for left, operator, right in links(node):
+        side = next((each for each in (left, right) if isinstance(each, ast.ComparisonChain | ast.BoolOp)), None)
+        if operator in ORDERS and side is not None:
+            whole = " ".join((written(left), operator, written(right)))
+            yield warning(
+                "truth-compared", f"`{written(side)}` is true or false, which are 1 and 0 as numbers", node.span,
+                "compares a truth value", f"`{whole}` without brackets compares all three"
+                if isinstance(side, ast.ComparisonChain) else "`and` and `or` join whole conditions",
+            )  # fmt: skip
+
+
+def _units(node: ast.SyntaxNode) -> Iterator[Diagnostic]:
+    """Numbers beside which a comment says that they are speeds in another unit."""
+    match node:
+        case ast.Assign(value=value) | ast.ParamItem(value=value) | ast.WithSpecifier(property="speed", value=value):
+            pass
+        case _:
+            return
+    numbers = list(terms(value, {}))
+    if not numbers or any(isinstance(each, ast.BinaryOp) for each in walk(value)):
+        return
+    last = value.span.source.line(value.span.source.position(value.span.end - 1)[0])
+    comment = last[value.span.source.position(value.span.end - 1)[1] :].partition("#")[2]
+    unit = _SPEEDS_ELSEWHERE.search(comment)
+    said = {float(each.group()) for each in _DIGITS.finditer(comment)}
+    if unit is None or _SPEEDS_HERE.search(comment) or (said and said.isdisjoint(map(number, numbers))):
+        return
+    factor = _IN_METRES_A_SECOND.get(unit.group().lower(), " / 3.6")
+    yield warning(
+        "unit-in-comment", f"`{written(value)}` is taken as it is, whatever unit the comment names", value.span,
+        "speeds are in m/s", f"write `{written(value)}{factor}` for {unit.group()}",
+    )  # fmt: skip
+
+
+# --- speeds
+
+
+def _speeds(node: ast.SyntaxNode, values: Values) -> Iterator[Diagnostic]:
+    """Speeds above what roads see, and below 0."""
     places: list[ast.SyntaxNode] = []
     match node:
         case ast.WithSpecifier(property="speed"):
             places = [node.value]
         case ast.ComparisonChain():
-            sides = _compared(node)
+            sides = compared(node)
             if any(isinstance(side, ast.Attribute) and side.name == "speed" for side in sides):
                 places += sides
         case _:
             pass
     for place in places:
-        for term in _terms(place):
-            value = _number(term)
-            if value is not None and value > _FASTEST_MPS:
-                text = term.span.text
-                yield _warning(
+        found = [(value, term) for term in terms(place, values) if (value := number(term)) is not None]
+        for value, term in found:
+            text = term.span.text
+            if value > _FASTEST_MPS:
+                yield warning(
                     "speed-beyond-roads", f"{text} m/s are {value * 3.6:.0f} km/h", term.span, "speeds are in m/s",
                     f"write `{text} / 3.6` for km/h",
                 )  # fmt: skip
+        if any(value < 0 for value, _ in found):
+            yield warning(
+                "speed-negative", f"`{written(place)}` is below 0: a speed says how fast, not which way",
+                place.span, "no speed is negative", "`facing 180 deg relative to roadDirection` goes against the road",
+            )  # fmt: skip
 
 
 def _unseen(nodes: list[ast.SyntaxNode]) -> Iterator[Diagnostic]:
@@ -291,8 +205,8 @@ def _unseen(nodes: list[ast.SyntaxNode]) -> Iterator[Diagnostic]:
     for node in nodes:
         match node:
             case ast.UnaryOp(operator="not", operand=ast.Phrase(row=phrases.CAN_SEE) as seen):
-                yield _warning(
-                    "default-view", f"`{_text(seen)}` asks whether it is within the view that its class has by "
+                yield warning(
+                    "default-view", f"`{written(seen)}` asks whether it is within the view that its class has by "
                     "default: nothing hides anything", node.span, "a matter of distance and direction",
                     "a requirement on the distance says it plainly",
                     "`with visibleDistance 30, with viewAngle 120 deg` sets a view",
@@ -307,7 +221,7 @@ def _unseen(nodes: list[ast.SyntaxNode]) -> Iterator[Diagnostic]:
 def _is_measured(node: ast.SyntaxNode) -> bool:
     match node:
         case ast.Attribute(name=name):
-            return name in _ANGLE_PROPERTIES | _MEASURED
+            return name in ANGLE_PROPERTIES | _MEASURED
         case ast.Call(function=ast.Name(id="abs")) if node.arguments:
             return _is_measured(node.arguments[0].value)
         case _:
@@ -318,30 +232,27 @@ def _exact(node: ast.SyntaxNode) -> Iterator[Diagnostic]:
     """Measured numbers that are asked to be a number exactly."""
     if not isinstance(node, ast.ComparisonChain):
         return
-    for left, operator, right in _links(node):
+    for left, operator, right in links(node):
         if operator != "==" or _is_measured(left) == _is_measured(right):
             continue
-        measured, number = (left, right) if _is_measured(left) else (right, left)
-        if _number(number) is not None:
-            near = measured.span.text if _number(number) == 0 else f"({measured.span.text}) - {number.span.text}"
-            within = "5 deg" if _is_angle(measured) else "0.5"
-            yield _warning(
-                "exact-number", f"`==` asks for exactly {number.span.text}, which what is measured hardly ever is",
+        measured, asked = (left, right) if _is_measured(left) else (right, left)
+        if number(asked) is not None:
+            near = measured.span.text if number(asked) == 0 else f"({measured.span.text}) - {asked.span.text}"
+            within = "5 deg" if is_angle(measured) else "0.5"
+            yield warning(
+                "exact-number", f"`==` asks for exactly {asked.span.text}, which what is measured hardly ever is",
                 node.span, "no tolerance holds in requirements",
                 f"`abs({near}) < {within}` asks for what is near it",
             )  # fmt: skip
 
 
-# --- ranges
-
-
 def _range(node: ast.SyntaxNode) -> Iterator[Diagnostic]:
     match node:
         case ast.Call(function=ast.Name(id=name)) if name in _RANGES and len(node.arguments) >= 2:
-            low, high = (_number(argument.value) for argument in node.arguments[-2:])
+            low, high = (number(argument.value) for argument in node.arguments[-2:])
             if low is not None and high is not None and low > high:
                 first, second = (argument.value.span.text for argument in node.arguments[-2:])
-                yield _warning(
+                yield warning(
                     "range-reversed", f"this `{name}` ends before it starts", node.span,
                     "the lower end comes first", f"write `{second}, {first}`",
                 )  # fmt: skip
@@ -373,7 +284,7 @@ def _unused(nodes: list[ast.SyntaxNode]) -> Iterator[Diagnostic]:
             told.add(target.id)
             near = similar(target.id, read)
             hints = (f"`{near}` is read, and spelled nearly like it",) if near else ()
-            yield _warning("unused-variable", f"nothing uses `{target.id}`", target.span, "set here", *hints)
+            yield warning("unused-variable", f"nothing uses `{target.id}`", target.span, "set here", *hints)
 
 
 @cache
@@ -396,4 +307,4 @@ def _unknown_properties(nodes: Iterable[ast.SyntaxNode]) -> Iterator[Diagnostic]
             hints = [f"`{near}` is spelled nearly like it"] if near else []
             hints.append("where it is an attribute of labels, `scenicq check SCENARIO DATASET` says so")
             message = f"no class has a property `{node.property}`, and nothing reads it"
-            yield _warning("unknown-property", message, node.property_span, "set here", *hints)
+            yield warning("unknown-property", message, node.property_span, "set here", *hints)

@@ -34,9 +34,14 @@ _LEFT = (
 )
 _RIGHT = _LEFT.replace("> 0", "< 0").replace("left of", "right of")
 _INSIDE = "`X in R` asks whether the box of X lies in a region, `X.position in R` its centre alone"
-_TOWARD = "`abs((angle from X to Y) - X.heading) < 20 deg` asks whether X faces Y; `facing toward Y` turns a new object"
+_TOWARD = (
+    "`abs(relative heading of (angle from X to Y) from X) < 20 deg` asks whether X faces Y; "
+    "`facing toward Y` turns a new object"
+)
 _SEES = "`X can see Y` asks whether Y is in view"
 _OVER_TIME = "`require (A) until (B)` and `eventually (A and next (eventually B))` say what comes after what"
+_AT_FIRST = "`require A` asks A of the start alone, unless it says always or eventually"
+_HOW_LONG = "`require always A` asks A of whole intervals; the option --min-duration says how long they last"
 _BEYOND = (
     "`hides(X, Y)` asks whether X hides Y from the ego (`from scenicq.labels import hides`); "
     "`beyond X by Range(2, 30)` places a new object where X hides it"
@@ -48,7 +53,7 @@ _SAID = {
     "back": _BEHIND,
     "right": _RIGHT, "on": _INSIDE, "inside": _INSIDE, "onto": _INSIDE, "faces": _TOWARD, "facing": _TOWARD,
     "sees": _SEES, "visible": _SEES, "then": _OVER_TIME, "after": _OVER_TIME, "before": _OVER_TIME,
-    "overtakes": _OVER_TIME, "passes": _OVER_TIME, "initial": _OVER_TIME, "initially": _OVER_TIME,
+    "overtakes": _OVER_TIME, "passes": _OVER_TIME, "initial": _AT_FIRST, "initially": _AT_FIRST, "for": _HOW_LONG,
     "occludes": _BEYOND, "hides": _BEYOND, "occluded": _BEYOND, "hidden": _BEYOND,
 }  # fmt: skip
 """How a condition is said that people write with that word."""
@@ -101,7 +106,12 @@ def phrase_hint(tokens: Sequence[Token], index: int) -> str:
     start = index
     while start and tokens[start - 1].kind not in ("newline", "indent", "dedent"):
         start -= 1
-    said = _SAID if tokens[start].text == "require" else _MADE
+    if word in _UNIT and before.text == ")":
+        means, factor = _UNIT[word]
+        return f"{means}: write {f'`(...){factor}`' if factor else 'the number alone'}"
+    if word == "with" and after[:1] == [":"]:
+        return "`with speed 3, with width 2` sets two properties"
+    said = _SAID if tokens[start].text in ("require", "terminate") else _MADE
     words = (token.text for token in tokens[max(start, index - _FURTHEST) : index + 1])
     return next((said[each] for each in words if each in said), "")
 

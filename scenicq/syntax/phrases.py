@@ -16,9 +16,9 @@ from typing import TypeVar
 from scenicq.syntax.precedence import ALONG, AT, IMPLIES, POWER, PREFIX, PRODUCT, RELATIVE, UNION, UNTIL
 
 __all__ = [
-    "ALWAYS", "BOX_PARTS", "CAN_SEE", "DEG", "FACING", "IMPLICATION", "INFIXES_AT", "INFIX_NAMES", "INFIX_WORDS",
-    "OPERATORS", "PREFIXES_AT", "RELATION", "SPECIFIERS", "SPECIFIERS_AT", "TEMPORAL", "VECTOR", "VERSIONS", "Operand",
-    "PhraseRow", "each_meaning",
+    "ALWAYS", "BOX_PARTS", "CAN_SEE", "DEG", "DIRECTIONS", "FACING", "IMPLICATION", "INFIXES_AT", "INFIX_NAMES",
+    "INFIX_WORDS", "OPERATORS", "PREFIXES_AT", "RELATION", "SPECIFIERS", "SPECIFIERS_AT", "TEMPORAL", "VECTOR",
+    "VERSIONS", "Operand", "PhraseRow", "each_meaning",
 ]  # fmt: skip
 
 Meaning = TypeVar("Meaning")
@@ -208,6 +208,8 @@ OPERATORS: tuple[PhraseRow, ...] = (
 
 _ROWS = {row.text: row for row in (*SPECIFIERS, *OPERATORS)}
 FACING, DEG, VECTOR = _ROWS["facing {heading}"], _ROWS["{value} deg"], _ROWS["{x} @ {y}"]
+DIRECTIONS = frozenset(row for row in OPERATORS if row.measures and row.words[0] in ("angle", "azimuth"))
+"""What is a direction on the map, not a turn from one to another."""
 RELATION, IMPLICATION = _ROWS["{left} relative to {right}"], _ROWS["{left} implies {right}"]
 ALWAYS = _ROWS["always {condition}"]
 CAN_SEE = _ROWS["{viewer} can see {target}"]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 from scenicq.errors import Diagnostic, Note, ScenarioError, Source, Span
 from scenicq.syntax import ast, phrases
 from scenicq.syntax.hints import condition_hint
@@ -93,10 +95,14 @@ def _refuse(item: ast.Evidence, version: int) -> ScenarioError:
     return ScenarioError(Diagnostic("parse-error", message, item.span, hints=hints))
 
 
+_ASKS = re.compile(r"\b(require|when|until|while|if|elif)\b")
+"""Words after which a condition stands."""
+
+
 def _as_condition(span: Span) -> str:
-    """How to say what looks like an object in a requirement, where only a condition can stand."""
+    """How to say what looks like an object where only a condition can stand."""
     before, after = span.source.text[: span.start].rpartition("\n")[2], span.source.text[span.end :].split(None, 1)
-    return condition_hint(after[0]) if before.lstrip().startswith("require") and after else ""
+    return condition_hint(after[0]) if _ASKS.search(before) and after else ""
 
 
 def _mixed(item: ast.Evidence, other: ast.Evidence) -> ScenarioError:

@@ -28,6 +28,12 @@ def test_it_says_how_the_scenario_is_read(run, scenarios, crossroads):
     )
 
 
+def test_requirements_over_time_are_counted(run, crossroads):
+    program = "ego = new Car; other = new Car; require always other.speed > 3; require ego.speed > 1"
+    told = run("check", "-e", f"{program}; require eventually other.speed > 5", crossroads).stdout
+    assert "1 requirement and 2 over time" in told
+
+
 def test_a_mistake_is_shown_once(run, mistake, crossroads):
     result = run("check", mistake, crossroads)
     assert (result.exit_code, result.stdout) == (2, "")

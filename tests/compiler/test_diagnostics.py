@@ -2,6 +2,8 @@
 
 import pytest
 
+from scenicq.compiler.coroutines import LibraryName
+from scenicq.compiler.values import describe
 from scenicq.errors import ScenarioError
 
 from .scenes import compiled, refused
@@ -108,3 +110,51 @@ def test_a_comma_after_the_class_is_told():
 def test_what_is_no_specifier_is_said_as_a_requirement(tried, told):
     with pytest.raises(ScenarioError, match=told):
         compiled(f"model scenic.domains.driving.model\nego = new Car\nother = new Car {tried}\n")
+
+
+def hints_of(text):
+    with pytest.raises(ScenarioError) as caught:
+        compiled(f"model scenic.domains.driving.model\nego = new Car\nother = new Car\n{text}\n")
+    (found,) = caught.value.diagnostics
+    return found.message, found.label, " ".join(found.hints)
+
+
+@pytest.mark.parametrize(
+    ("tried", "told"),
+    [
+        ("require intersects(other, ego)", "`X intersects Y`"),
+        ("which = random.choice([1, 2])", "`Uniform(a, b)`"),
+        ("third = new Car at Offset(1, 2) relative to ego", "`at X offset by 2 @ 5`"),
+        ("third = new Car facing west", "`90 deg`"),
+        ("third = new Junction", "`on intersection`"),
+        ("third = new Pedestrian on network.sidewalks", "`Uniform(*elements)`"),
+        (
+            "require (distance from ego to [network.lanes[0], network.lanes[1], Uniform(*network.lanes)]) < 5",
+            "chooses one",
+        ),
+        ("third = new Car with brand 'a' at ego offset by 2 @ 3", "a comma separates specifiers"),
+        ("zebras = network.crosswalks", "`crossings` is what Scenic calls them"),
+        ("long = [each for each in network.roads if each.extent > 3]", "`centerline`"),
+        ("bends = network.lanes[0].curvature", "`orientation`"),
+    ],
+)
+def test_invented_words_name_what_there_is(tried, told):
+    assert told in hints_of(tried)[2]
+
+
+def test_a_parameter_that_is_not_set_is_no_attribute_of_a_module():
+    message, _, hints = hints_of("param town = 'a'\nx = globalParameters.towns")
+    assert message == "the program has no parameter `towns`"
+    assert "`town`" in hints
+
+
+@pytest.mark.parametrize("value", ["ego.position", "ego.speed", "Range(1, 2)", "ego can see other"])
+def test_values_are_called_by_no_name_of_the_code(value):
+    """What is no class is said in words, whatever the class is called that holds it."""
+    said = hints_of(f"x = isinstance(1, {value})")[1]
+    assert said.startswith("this is a ")
+    assert said.islower()
+
+
+def test_what_the_compiler_alone_knows_is_called_by_words():
+    assert describe(LibraryName("WalkBehavior", is_action=False)) == "a library name"
