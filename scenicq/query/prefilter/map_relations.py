@@ -55,16 +55,19 @@ class LookUp:
         object: The object, by index.
         ranks: Any of so many elements at the place may be meant; where there are more, it is not known which.
         choice: What chooses among them; None where it is always the same.
+        by_heading: Whether the way that the object goes says which of several may be meant.
     """
 
     occupancy: Occupancy
     object: int
     ranks: int = 1
     choice: Identity | None = None
+    by_heading: bool = False
 
     def is_like(self, other: LookUp) -> bool:
         """Whether both are of one element."""
-        return self.occupancy is other.occupancy and self.object == other.object
+        same = self.occupancy is other.occupancy and self.object == other.object
+        return same and self.by_heading == other.by_heading
 
     def is_same(self, other: LookUp) -> bool:
         """Whether both always find the same element."""
@@ -80,7 +83,8 @@ def look_up_of(node: Node) -> LookUp | None:
     first = found[0]
     if first is None or not all(each is not None and each.is_like(first) for each in found):
         return None
-    return replace(first, ranks=len(found), choice=choice)
+    # where several are at the place, columns do not tell which of them lead the object's way
+    return replace(first, ranks=1 if first.by_heading else len(found), choice=choice)
 
 
 def _of_rank(node: Node) -> LookUp | None:
@@ -89,7 +93,7 @@ def _of_rank(node: Node) -> LookUp | None:
             ArithmeticOp.MUL,
             (DirectionAt(Constant(ElementAtPoint() as one), Feature(property="position") as place), Constant()),
         ):
-            return LookUp(one.options, place.object)
+            return LookUp(one.options, place.object, by_heading=one.by_heading)
         case _:
             return None
 
