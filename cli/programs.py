@@ -38,8 +38,8 @@ LANES = click.option(
     "--lanes",
     type=option_type("lanes"),
     default="along",
-    help="Which of several lanes that contain an object are its own, as in `ego.lane`: along, those that lead within 60 "
-    "degrees of its heading, and all where none does or it has no heading; any, all of them.",
+    help="Which of several lanes that contain an object are its own, as in `ego.lane`: along, those that lead within "
+    "60 degrees of its heading, and all where none does or it has no heading; any, all of them.",
 )
 """The option for the lanes of an object; see `compile_scenario`."""
 

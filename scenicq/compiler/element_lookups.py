@@ -158,7 +158,7 @@ class Lookups:
         return self.tables[key]
 
     def index(self, key: object, table: LookupTable, place: Node, going: Node | None, span: Span) -> Node:
-        """Which option lies at a random place; of several one that leads the way that somebody goes, if that is given."""
+        """Which option lies at a random place; of several one that leads the way somebody goes, if that is given."""
         where = (place.object, place.property, place.current) if isinstance(place, Feature) else id(place)
         whose = (key, going is not None), where
         if whose not in self.indices:

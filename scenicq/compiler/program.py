@@ -16,6 +16,7 @@ from scenicq.compiler.absent import check_directions, listed
 from scenicq.compiler.arithmetic import no_number
 from scenicq.compiler.coerce import PARTIAL, to_node, to_region, to_scalar, to_vector
 from scenicq.compiler.deviations import is_zero
+from scenicq.compiler.element_lookups import LaneRule
 from scenicq.compiler.environment import Environment
 from scenicq.compiler.imported_files import Loader
 from scenicq.compiler.imports import Modules

@@ -6,8 +6,8 @@ looked at. The field's angles number the options; an angle times `scale` is the 
 
 Where elements overlap, Scenic takes the first in the order of its lists, an accident; here each of them is allowed, and
 a rank says which (as with the directions of traffic). Who is there and which way it goes may leave only some of them:
-those that lead within `ALONG` of its heading, if there are any. A point in none, but within the map's tolerance of some,
-counts as in these, as in Scenic; here the border is a polygon, so that the plane falls into convex pieces.
+those that lead within `ALONG` of its heading, if there are any. A point in none, but within the map's tolerance of
+some, counts as in these, as in Scenic; here the border is a polygon, so that the plane falls into convex pieces.
 """
 
 from __future__ import annotations

@@ -24,7 +24,19 @@ from scenicq.forest.condition import expand
 from scenicq.forest.course_ends import has_ends
 from scenicq.forest.ego_frame import DISTANCE, PLACE
 from scenicq.forest.interpret import OnMap, Steps, interpret, steps_of
-from scenicq.forest.nodes import COURSE, GOING, PAST, Among, DirectionAt, Feature, Identity, LaneCourse, Leaf, Node, Value
+from scenicq.forest.nodes import (
+    COURSE,
+    GOING,
+    PAST,
+    Among,
+    DirectionAt,
+    Feature,
+    Identity,
+    LaneCourse,
+    Leaf,
+    Node,
+    Value,
+)
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.temporal import Atom
 from scenicq.forest.unobserved import certain_and_possible

@@ -80,8 +80,7 @@ def own_lanes(thing: LabelObject, rule: str) -> list[Lane]:
 def is_clear(thing: LabelObject) -> bool:
     near = around(thing.x, thing.y)
     return near is not None and (
-        thing.heading is None
-        or all(abs(turn(way, thing.heading) - math.radians(60)) > CLEAR_RAD for _, way in near)
+        thing.heading is None or all(abs(turn(way, thing.heading) - math.radians(60)) > CLEAR_RAD for _, way in near)
     )
 
 
@@ -116,9 +115,7 @@ def said(draw: random.Random, roles: list[str], depth: int = 1) -> Said:
         case "lane":
             return Said(f"{a}.lane is {b}.lane", same(lambda lane: lane))
         case "other":
-            return Said(
-                f"{a}.lane is not {b}._lane", lambda c: c[a][1] is not None and c[a][1] is not c[b][1]
-            )
+            return Said(f"{a}.lane is not {b}._lane", lambda c: c[a][1] is not None and c[a][1] is not c[b][1])
         case "group":
             return Said(f"{a}.laneGroup is {b}.laneGroup", same(lambda lane: lane.group))
         case "road":
@@ -186,7 +183,14 @@ def thing(draw: random.Random, name: str, *, one: bool = False) -> LabelObject:
         heading = way + draw.choice([draw.uniform(-0.3, 0.3), draw.uniform(-3.1, 3.1), *(k + draw.uniform(-0.02, 0.02)
                                     for k in (math.radians(60), -math.radians(60)))])  # fmt: skip
         made = LabelObject(
-            name, "Car", "Car", x, y, None if draw.random() < 0.12 else math.remainder(heading, math.tau), 2.0, 4.5,
+            name,
+            "Car",
+            "Car",
+            x,
+            y,
+            None if draw.random() < 0.12 else math.remainder(heading, math.tau),
+            2.0,
+            4.5,
             track=name,
         )
         if is_clear(made) and not (one and len(own_lanes(made, "along")) != 1):
@@ -280,7 +284,8 @@ def check_intervals(folder: Path, seed: int, programs: int) -> Counter[str]:
     for number in range(programs):
         asked, always, steps = said(draw, ["ego", "a"]), draw.random() < 0.5, draw.choice([1, 2])
         head = f"model scenic.domains.driving.model\nego = new Car {ANYWHERE}\na = new Car {ANYWHERE}\n"
-        text = f"{head}require {'always' if always else 'eventually'} ({asked.text})\nterminate after {steps / 2} seconds\n"
+        formula = f"{'always' if always else 'eventually'} ({asked.text})"
+        text = f"{head}require {formula}\nterminate after {steps / 2} seconds\n"
         for rule in ("along", "any"):
             right: set[tuple[str, str]] = set()
             for recording, first in itertools.product(recordings, range(12 - steps)):

@@ -15,7 +15,7 @@ from shapely import Point, union_all
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import ScenarioError, Source
 from scenicq.forest.evaluate import evaluate
-from scenicq.forest.nodes import Constant, Index, Node, PointIn, Select
+from scenicq.forest.nodes import GOING, Constant, Index, Node, PointIn, Select
 from scenicq.forest.walk import leaves
 from scenicq.geometry.regions import PolygonSet
 from scenicq.match.matcher import Matcher
@@ -206,7 +206,8 @@ def test_one_of_the_elements_at_a_place_is_meant_throughout(dataset: Dataset, sa
     chosen = {leaf.identity: len(leaf.weights) for leaf in leaves(*conditions) if isinstance(leaf, Index)}
     matcher, several = Matcher(scenario, MatchOptions()), 0
     for label in dataset.labels():
-        ego = {(0, "position"): (label.ego.x, label.ego.y), (0, "heading"): label.ego.heading}
+        heading = label.ego.heading
+        ego = {(0, "position"): (label.ego.x, label.ego.y), (0, "heading"): heading, (0, GOING): heading}
         right = any(
             all(evaluate(each, dict(zip(chosen, map(float, ranks), strict=True)), ego) is True for each in conditions)
             for ranks in itertools.product(*map(range, chosen.values()))
