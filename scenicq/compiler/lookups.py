@@ -3,7 +3,7 @@
 At a known place it is one element, or None. At a random one it is a random choice between the elements whose index is
 a function of the place (see `occupancy`), so that any two look-ups at one place agree; its attributes are again random
 choices. Where elements of one kind overlap, any of them may be meant; which one is chosen once for a place, for lanes,
-their sections, groups and roads together. Of the lanes at an object's place those are its own that lead its way
+their sections, groups and roads together. Those lanes at an object's place are its own that lead its way
 (`ElementAtPoint.along`), unless all are asked for (`LaneRule`): `obj.lane`, its sections, groups and roads.
 """
 

@@ -45,9 +45,9 @@ OptionArea: TypeAlias = tuple[Shape, int, int]
 """An area, the number of the option that is found in it, and whose area it is: an owner is found once at a point."""
 Layer: TypeAlias = tuple[OptionArea, ...]
 Corners: TypeAlias = NDArray[np.float64]
-Place: TypeAlias = tuple[float, float]
+_Point: TypeAlias = tuple[float, float]
 """A point in metres."""
-Meant: TypeAlias = tuple[bool, ...]
+_Meant: TypeAlias = tuple[bool, ...]
 """Which of the options at a point may be meant."""
 
 
@@ -128,7 +128,7 @@ class Occupancy:
             self._known_together[key] = known
         return known
 
-    def along(self, found: Sequence[tuple[int, ...]], places: Sequence[Place], going: Sequence[float]) -> list[Meant]:
+    def along(self, found: Sequence[tuple[int, ...]], places: Sequence[_Point], going: Sequence[float]) -> list[_Meant]:
         """Which of the options at places lead the way that somebody goes: all, if none does.
 
         Args:
@@ -139,24 +139,24 @@ class Occupancy:
         new = [place for place in dict.fromkeys(places) if place not in self._known_ways]
         if new:
             self._find_ways(new)
-        meant: list[Meant] = []
+        meant: list[_Meant] = []
         for options, place, heading in zip(found, places, going, strict=True):
             ways = self._known_ways[place]
             own = tuple(any(abs(math.remainder(way - heading, math.tau)) <= ALONG for way in each) for each in ways)
             meant.append(own if any(own) else (True,) * len(options))
         return meant
 
-    def _find_ways(self, places: Sequence[Place]) -> None:
+    def _find_ways(self, places: Sequence[_Point]) -> None:
         """The headings that each of several options at places leads in, which are kept by their places."""
         if len(self._known_ways) + len(places) > _KEPT:
             self._known_ways.clear()
-        owners: dict[Place, tuple[int, tuple[int, ...]]] = {}
+        owners: dict[_Point, tuple[int, tuple[int, ...]]] = {}
         self._find(np.array(places), places, owners)
-        asked: dict[tuple[int, int], list[Place]] = {}
+        asked: dict[tuple[int, int], list[_Point]] = {}
         for place, (level, numbers) in owners.items():
             for number in numbers:
                 asked.setdefault((level, number), []).append(place)
-        said: dict[tuple[int, int, Place], tuple[float, ...]] = {}
+        said: dict[tuple[int, int, _Point], tuple[float, ...]] = {}
         for (level, number), some in asked.items():
             way = self.ways[level][number]
             headings = [()] * len(some) if way is None else way.values_many(np.array(some))
@@ -167,8 +167,8 @@ class Occupancy:
     def _find(
         self,
         xy: NDArray[np.float64],
-        places: Sequence[Place],
-        owners: dict[Place, tuple[int, tuple[int, ...]]] | None = None,
+        places: Sequence[_Point],
+        owners: dict[_Point, tuple[int, tuple[int, ...]]] | None = None,
     ) -> list[tuple[int, ...]]:
         """`at` for points (n, 2), which are kept by their places.
 
@@ -325,6 +325,18 @@ class Occupancy:
         return [shape for shape in self._meeting(trees, area) if shape is not area and self._overlap(area, shape)]
 
     @cached_property
+    def spans(self) -> dict[str, tuple[float, float]]:
+        """By the id of each area of the first layer a heading, and how far from it its owner turns at most."""
+        found: dict[str, tuple[float, float]] = {}
+        known: dict[int, tuple[float, float]] = {}
+        for name, (_, _, owner) in zip(self.elements[0], self.layers[0], strict=True):
+            way = self.ways[0][owner]
+            if owner not in known:
+                known[owner] = (0.0, math.inf) if way is None else way.span
+            found[name] = known[owner]
+        return found
+
+    @cached_property
     def _trees(self) -> tuple[STRtree, ...]:
         return tuple(STRtree([area for area, _, _ in layer]) for layer in self.layers)
 
@@ -341,11 +353,11 @@ class Occupancy:
         return {}
 
     @cached_property
-    def _known(self) -> dict[Place, tuple[int, ...]]:
+    def _known(self) -> dict[_Point, tuple[int, ...]]:
         return {}
 
     @cached_property
-    def _known_ways(self) -> dict[Place, tuple[tuple[float, ...], ...]]:
+    def _known_ways(self) -> dict[_Point, tuple[tuple[float, ...], ...]]:
         return {}
 
     @cached_property
@@ -403,7 +415,7 @@ class ElementAtPoint:
         several = [place for place, each in enumerate(found) if len(each) > 1 and not math.isnan(going[place])]
         if several:
             some = [found[place] for place in several]
-            places: list[Place] = [(x, y) for x, y in xy[several].tolist()]
+            places: list[_Point] = [(x, y) for x, y in xy[several].tolist()]
             meant = options.along(some, places, [going[place] for place in several])
             for place, mine, those in zip(several, some, meant, strict=True):
                 if not those[rank % len(mine)]:

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 from scenicq.errors import Span
 from scenicq.forest.groups import PARAMS, Comparison, Condition, Group
-from scenicq.forest.nodes import GOING, Node, Select
+from scenicq.forest.nodes import Node, Select
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.walk import conjuncts, postorder
 from scenicq.geometry.network import Network
@@ -31,7 +31,7 @@ from scenicq.store.sql import sql_text
 
 __all__ = ["necessary_conditions", "sufficient_conditions"]
 
-_COLUMNED = frozenset(object_columns(EGO)) | {GOING}
+_COLUMNED = frozenset(object_columns(EGO))
 """Properties that a label has in columns; all others are among its attributes."""
 
 
