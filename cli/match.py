@@ -42,7 +42,7 @@ from .options import DEFAULTS, TOPICS, option_type, query_options
 from .output import ProgressBar, choose_format
 from .pieces import LateShardError, Shard, parse_shard, run_shard
 from .plan import show_plan
-from .programs import MAP_DEFAULTS, PROGRAM_TEXT, SCENARIO, given_program
+from .programs import LANES, MAP_DEFAULTS, PROGRAM_TEXT, SCENARIO, given_program
 from .remarks import remarks, show_remarks
 from .report import count, show
 from .sources import SENSORS
@@ -150,6 +150,7 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @SENSORS
 @click.option("--scenic", type=option_type("scenic"), help="Version of Scenic.  [default: inferred]")
 @MAP_DEFAULTS
+@LANES
 @click.option("--initial", is_flag=True, help="Ignore behaviors and other dynamic parts: match the initial scene.")
 @click.option("--behaviors", type=option_type("behaviors"), default="motion", help="What becomes of behaviors: "
               "motion runs them and compares what they do with what is seen; guards lets every action pass; ignore "

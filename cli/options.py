@@ -20,7 +20,7 @@ DEFAULTS = MatchOptions()
 """What counts as a match unless options say otherwise."""
 SHARED = frozenset({
     "tolerance", "classes", "ego", "radius", "enforce", "exact", "solver", "method", "timeout", "budget", "scenic",
-    "initial", "map_defaults", "behaviors", "reaction", "ignore_params", "strict",
+    "initial", "map_defaults", "lanes", "behaviors", "reaction", "ignore_params", "strict",
 })  # fmt: skip
 """Options of `match` that say what a match is; the others say which frames and what to show of them."""
 OVER_TIME = frozenset({"min_duration", "gap"})

@@ -12,7 +12,9 @@ from scenicq.errors import DataError, Diagnostic, Source
 from scenicq.query.execution.option_texts import DRIVING
 from scenicq.query.execution.program_files import read_program
 
-__all__ = ["MAP_DEFAULTS", "PROGRAM_TEXT", "SCENARIO", "given_program", "read_scenario"]
+from .options import option_type
+
+__all__ = ["LANES", "MAP_DEFAULTS", "PROGRAM_TEXT", "SCENARIO", "given_program", "read_scenario"]
 
 SCENARIO = "A Scenic program, as a file; `-` is standard input. Not with -e."
 """What the help says of the argument."""
@@ -32,6 +34,14 @@ MAP_DEFAULTS = click.option(
     "map it never does.",
 )
 """The option for what plain words ask of a map; see `compile_scenario`."""
+LANES = click.option(
+    "--lanes",
+    type=option_type("lanes"),
+    default="along",
+    help="Which of several lanes that contain an object are its own, as in `ego.lane`: along, those that lead within "
+    "60 degrees of its heading, and all where none does or it has no heading; any, all of them.",
+)
+"""The option for the lanes of an object; see `compile_scenario`."""
 
 
 def read_scenario(path: Path) -> Source:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from scenicq.compiler.element_lookups import LaneRule
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import plain_json
 from scenicq.exporters.sample import PATIENCE_S, sample_labels, sample_record, write_sample
@@ -17,7 +18,7 @@ from .check import networks_of, read_version
 from .manual import Manual
 from .option_type import OptionType
 from .options import option_type
-from .programs import MAP_DEFAULTS, PROGRAM_TEXT, SCENARIO, given_program
+from .programs import LANES, MAP_DEFAULTS, PROGRAM_TEXT, SCENARIO, given_program
 from .streams import say
 
 __all__ = ["sample"]
@@ -54,13 +55,14 @@ __all__ = ["sample"]
 )
 @click.option("--scenic", type=option_type("scenic"), help="Version of Scenic.  [default: inferred]")
 @MAP_DEFAULTS
+@LANES
 @click.option("--initial", is_flag=True, help="Ignore behaviors and other dynamic parts.")
 @click.option("-o", "--output", metavar="DIR", type=click.Path(path_type=Path),
               help="Write an interchange folder with labels and map, to be ingested.")  # fmt: skip
 @click.pass_context
 def sample(ctx: click.Context, scenario: str | None, dataset: str | None, *, program: str | None,
            map_file: Path | None, number: int, seed: int,
-           waive: str, timeout: float, scenic: str | None, map_defaults: bool, initial: bool,
+           waive: str, timeout: float, scenic: str | None, map_defaults: bool, lanes: LaneRule, initial: bool,
            output: Path | None) -> None:  # fmt: skip
     """Draw scenes from a scenario, as labels.
 
@@ -79,6 +81,7 @@ def sample(ctx: click.Context, scenario: str | None, dataset: str | None, *, pro
         loader=SiblingFiles(Path(source.name)),
         model=model,
         map_defaults=map_defaults,
+        lanes=lanes,
     )
     labels = sample_labels(compiled, number, seed, read_built_ins(waive), timeout_s=timeout)
     if output is not None:

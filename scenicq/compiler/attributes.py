@@ -10,7 +10,7 @@ from scenicq.compiler.arithmetic import check_weight, hashed, is_flat, is_random
 from scenicq.compiler.coerce import property_node, to_heading, to_region, to_scalar, to_vector
 from scenicq.compiler.elements import MISSING, is_of_elements, names_of, of_element, of_network
 from scenicq.compiler.following import follow
-from scenicq.compiler.lookups import look_up
+from scenicq.compiler.lookups import look_up_of
 from scenicq.compiler.random_values import each_existing, regions_apart
 from scenicq.compiler.region_attributes import REGION_METHODS, holds_regions, of_region
 from scenicq.compiler.suggestions import unknown_attribute
@@ -198,7 +198,7 @@ def _of_instance(run: Interpreter, value: Instance, name: str, span: Span) -> Mo
     if value.cls.derives_from("DrivingObject"):
         place = "laneGroup" if name == "oppositeLaneGroup" else name
         if place.lstrip("_") in _PLACES:
-            found = look_up(run, run.network, _PLACES[place.lstrip("_")], value, not place.startswith("_"), span)
+            found = look_up_of(run, value, _PLACES[place.lstrip("_")], not place.startswith("_"), span)
             return attribute(run, found, "opposite", span) if place is not name else found
     if name == "visibleRegion":
         return operators.visible_region(value, span)

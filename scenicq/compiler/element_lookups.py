@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import TypeAlias, cast
+from typing import Literal, TypeAlias, cast
 
 from shapely.geometry import Polygon
 
@@ -16,9 +16,13 @@ from scenicq.geometry.network import Network
 from scenicq.geometry.occupancy import TOLERANCE, ElementAtPoint, Layer, Occupancy
 from scenicq.geometry.passing_lanes import areas_at, areas_everywhere
 from scenicq.geometry.regions import PolygonSet
+from scenicq.geometry.road_direction import RoadDirection
 from scenicq.geometry.shapes import Shape
 
-__all__ = ["LOOKUPS", "LookupEntry", "LookupTable", "Lookups", "own", "ways_at", "ways_everywhere"]
+__all__ = ["LOOKUPS", "LaneRule", "LookupEntry", "LookupTable", "Lookups", "own", "ways_at", "ways_everywhere"]
+
+LaneRule: TypeAlias = Literal["along", "any"]
+"""Which of several lanes that contain an object are its own: those that lead its way, or all."""
 
 LookupEntry: TypeAlias = tuple[NetworkElement, "NetworkElement | tuple[Maneuver, ...] | None", NetworkElement]
 """An element whose area counts, what is found there, and what it is found for: at a point once for each of these."""
@@ -112,17 +116,19 @@ class LookupTable:
 
         places: list[Layer] = []
         ids: list[tuple[str, ...]] = []
+        ways: list[tuple[RoadDirection | None, ...]] = []
         for layer in layers:
             owners = {owner: number for number, owner in enumerate(dict.fromkeys(owner for _, _, owner in layer))}
             parts = [(part, *entry) for entry in layer for part in shapes.simple_parts([entry[0].polygon])]
             ids.append(tuple(area.id for _, area, _, _ in parts))
+            ways.append(tuple(each.orientation if isinstance(each, Lane) else None for each in owners))
             places.append(
                 tuple(
                     (part, nothing if element is None else numbers[element], owners[owner])
                     for part, _, element, owner in parts
                 )
             )
-        self.occupancy = Occupancy(tuple(places), nothing, name, tuple(ids))
+        self.occupancy = Occupancy(tuple(places), nothing, name, tuple(ids), tuple(ways))
 
 
 class Lookups:
@@ -151,26 +157,39 @@ class Lookups:
             self.tables[key] = LookupTable(name, family, layers())
         return self.tables[key]
 
-    def index(self, key: object, table: LookupTable, place: Node, span: Span) -> Node:
-        """Which option lies at a random place."""
+    def index(self, key: object, table: LookupTable, place: Node, going: Node | None, span: Span) -> Node:
+        """Which option lies at a random place; of several one that leads the way somebody goes, if that is given."""
         where = (place.object, place.property, place.current) if isinstance(place, Feature) else id(place)
-        if (key, where) not in self.indices:
+        whose = (key, going is not None), where
+        if whose not in self.indices:
             self._kept.append(place)
-            self.indices[key, where] = self._make_index(table, place, where, span)
-        return self.indices[key, where]
+            self.indices[whose] = self._make_index(table, place, going, where, span)
+        return self.indices[whose]
 
-    def numbers(self, table: LookupTable, place: Node, span: Span, count: int | None = None) -> tuple[Node, ...]:
-        """The numbers of the options at a place, by rank: all, or so many of them; after the last the first again."""
+    def numbers(
+        self, table: LookupTable, place: Node, span: Span, count: int | None = None, going: Node | None = None
+    ) -> tuple[Node, ...]:
+        """The numbers of the options at a place, by rank: all, or so many of them; after the last the first again.
+
+        Args:
+            table: The options.
+            place: The place.
+            span: Where they are asked for.
+            count: How many.
+            going: Which way goes who is there, where that matters.
+        """
         options = table.occupancy
         scale = build.constant(float(options.scale), span)
+        by = () if going is None else (going,)
 
         def number(rank: int) -> Node:
-            angle = DirectionAt(build.constant(ElementAtPoint(options, rank), span), place, span=span)
+            ranked = ElementAtPoint(options, rank, by_heading=bool(by))
+            angle = DirectionAt(build.constant(ranked, span), place, by, span=span)
             return build.arithmetic(ArithmeticOp.MUL, angle, scale, span=span)
 
         return tuple(map(number, range(options.depth if count is None else count)))
 
-    def _make_index(self, table: LookupTable, place: Node, where: object, span: Span) -> Node:
+    def _make_index(self, table: LookupTable, place: Node, going: Node | None, where: object, span: Span) -> Node:
         depth = table.occupancy.depth
         if depth == 1:
             return self.numbers(table, place, span)[0]
@@ -179,4 +198,4 @@ class Lookups:
             # more overlap here than the ranks of the family tell apart
             wide = (table.family, where, depth)
             rank = self.ranks.setdefault(wide, Index((1.0,) * depth, span=span))
-        return Select(rank, self.numbers(table, place, span, len(rank.weights)), span=span)
+        return Select(rank, self.numbers(table, place, span, len(rank.weights), going), span=span)

@@ -17,7 +17,7 @@ from scenicq.compiler.comparisons import binary, iterate
 from scenicq.compiler.coroutines import CoroutineCall, CoroutineDefinition
 from scenicq.compiler.courses import Course
 from scenicq.compiler.deviations import deviation, leaves_the_plane
-from scenicq.compiler.element_lookups import Lookups
+from scenicq.compiler.element_lookups import LaneRule, Lookups
 from scenicq.compiler.environment import Budget, Environment
 from scenicq.compiler.exclusions import Exclusions
 from scenicq.compiler.expressions import evaluate
@@ -83,6 +83,7 @@ class Interpreter:
         imports: Runs an import or model statement; the environment takes the names.
         network: The road network.
         gap_s: Seconds without a label at which the course of a track is cut.
+        lanes: Which of several lanes that contain an object are its own.
         budget: What the program may still use.
         objects: The objects made so far.
         records: What results are to carry.
@@ -100,6 +101,7 @@ class Interpreter:
     imports: Callable[[ast.Import | ast.ImportFrom | ast.Model, Environment], None]
     network: Network
     gap_s: float = GAP_S
+    lanes: LaneRule = "along"
     budget: Budget = field(default_factory=Budget)
     objects: list[Instance] = field(default_factory=list[Instance])
     requirements: list[RequireStatement] = field(default_factory=list[RequireStatement])

@@ -3,7 +3,8 @@
 At a known place it is one element, or None. At a random one it is a random choice between the elements whose index is
 a function of the place (see `occupancy`), so that any two look-ups at one place agree; its attributes are again random
 choices. Where elements of one kind overlap, any of them may be meant; which one is chosen once for a place, for lanes,
-their sections, groups and roads together.
+their sections, groups and roads together. Those lanes at an object's place are its own that lead its way
+(`ElementAtPoint.along`), unless all are asked for (`LaneRule`): `obj.lane`, its sections, groups and roads.
 """
 
 from __future__ import annotations
@@ -11,23 +12,51 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, cast
 
-from scenicq.compiler.coerce import to_vector
+from scenicq.compiler.coerce import property_node, to_heading, to_node, to_vector
 from scenicq.compiler.element_lookups import LOOKUPS, LookupTable, own, ways_at, ways_everywhere
 from scenicq.compiler.known_properties import as_constant
-from scenicq.compiler.values import Choice, ModelValue, fail
+from scenicq.compiler.values import Choice, Instance, ModelValue, fail
 from scenicq.errors import Span
-from scenicq.forest.nodes import Constant, Vector
+from scenicq.forest.nodes import GOING, Constant, Node, Vector
 from scenicq.geometry.elements import Intersection, NetworkElement
 from scenicq.geometry.network import Network
+from scenicq.geometry.occupancy import ElementAtPoint
 
 if TYPE_CHECKING:
     from scenicq.compiler.interpreter import Interpreter
 
-__all__ = ["among", "look_up", "look_up_ways"]
+__all__ = ["among", "look_up", "look_up_of", "look_up_ways"]
+
+
+def look_up_of(run: Interpreter, owner: Instance, name: str, reject: ModelValue, span: Span) -> ModelValue:
+    """What lies where an object is: of several lanes one that leads the way it goes.
+
+    Args:
+        run: The interpreter.
+        owner: The object.
+        name: Which look-up of the network.
+        reject: Whether there is no scene where there is no element.
+        span: Where it is asked for.
+
+    Raises:
+        ScenarioError: As `look_up`.
+    """
+    going: Node | None = None
+    if run.lanes == "along" and LOOKUPS[name][0] == "lane" and owner.index is not None:
+        if GOING not in owner.properties:
+            owner.properties[GOING] = to_heading(owner, span)
+        going = to_node(property_node(owner, GOING, span), span)
+    return look_up(run, run.network, name, owner, reject, span, going)
 
 
 def look_up(
-    run: Interpreter, network: Network, name: str, point: ModelValue, reject: ModelValue, span: Span
+    run: Interpreter,
+    network: Network,
+    name: str,
+    point: ModelValue,
+    reject: ModelValue,
+    span: Span,
+    going: Node | None = None,
 ) -> ModelValue:
     """`network.laneAt(point)` and its like.
 
@@ -38,6 +67,7 @@ def look_up(
         point: The place.
         reject: Whether there is no scene where there is no element; then the result is never None.
         span: The call.
+        going: Which way goes who is there, where that tells its lanes from others.
 
     Raises:
         ScenarioError: impossible-requirement, where there is no element at a known place but must be.
@@ -45,7 +75,7 @@ def look_up(
     family, layers = LOOKUPS[name]
     table = run.lookups.table((id(network), name), f"network.{name}", family, lambda: layers(network))
     known = getattr(network, name, None)
-    return _at(run, (id(network), name), table, point, reject, span, known)
+    return _at(run, (id(network), name), table, point, reject, span, known, going=going)
 
 
 def among(
@@ -75,6 +105,7 @@ def _at(
     span: Span,
     known: Callable[[float, float], ModelValue] | None,
     nothing: ModelValue = None,
+    going: Node | None = None,
 ) -> ModelValue:
     run.budget.step(span, run.budget.LOOK_UP_STEPS)
     place = to_vector(point, span)
@@ -82,7 +113,12 @@ def _at(
     options = (*table.options, nothing)
     if isinstance(certain, Constant):
         x, y = cast(Vector, certain.value)
-        found = options[table.occupancy.at(x, y)[0]] if known is None else known(x, y)
+        heading = None if going is None else as_constant(run, going)
+        if isinstance(heading, Constant) and isinstance(heading.value, float):
+            first = ElementAtPoint(table.occupancy, 0, by_heading=True)
+            found = options[round(first.along(x, y, heading.value) * table.occupancy.scale)]
+        else:
+            found = options[table.occupancy.at(x, y)[0]] if known is None else known(x, y)
         if found is None and reject:
             raise fail("impossible-requirement", f"there is nothing for `{table.occupancy.name}` at this point", span,
                        "no scene is left", ("without `reject`, the result is None",))  # fmt: skip
@@ -93,7 +129,7 @@ def _at(
                        ("the map of another dataset may have it",))  # fmt: skip
         return None
     run.budget.step(span, len(options) // run.budget.ITEMS_PER_STEP)
-    index = run.lookups.index(key, table, place, span)
+    index = run.lookups.index(key, table, place, going, span)
     if reject:
         run.excluded.add(index, [len(table.options)], len(options), span)
     return Choice(index, options, len(options))

@@ -16,6 +16,7 @@ from scenicq.compiler.absent import check_directions, listed
 from scenicq.compiler.arithmetic import no_number
 from scenicq.compiler.coerce import PARTIAL, to_node, to_region, to_scalar, to_vector
 from scenicq.compiler.deviations import is_zero
+from scenicq.compiler.element_lookups import LaneRule
 from scenicq.compiler.environment import Environment
 from scenicq.compiler.imported_files import Loader
 from scenicq.compiler.imports import Modules
@@ -56,6 +57,7 @@ def compile_scenario(
     model: str | None = None,
     map_defaults: bool = True,
     gap_s: float = GAP_S,
+    lanes: LaneRule = "along",
 ) -> Scenario:
     """Compile a program against a map.
 
@@ -72,6 +74,7 @@ def compile_scenario(
         map_defaults: Whether the world model's classes place and turn their objects as the map has it, where nothing
             else does. Without a map they never do, and the scenario's warnings say so.
         gap_s: Seconds without a label at which the course of a track is cut.
+        lanes: Which of several lanes that contain an object are its own: those that lead its way, or all.
 
     Raises:
         ScenarioError: The program is wrong or uses what is not supported.
@@ -81,7 +84,7 @@ def compile_scenario(
             timed = None if initial or behaviors is None else TimedStatements(behaviors, reaction_s)
             return _compiled(
                 source, network, version, initial=initial, timed=timed, loader=loader, model=model,
-                map_defaults=map_defaults, gap_s=gap_s,
+                map_defaults=map_defaults, gap_s=gap_s, lanes=lanes,
             )  # fmt: skip
     except Exhausted:
         what = f"evaluating the program takes more than {LIMITS.program_seconds:g} s"
@@ -100,12 +103,13 @@ def _compiled(
     model: str | None,
     map_defaults: bool,
     gap_s: float,
+    lanes: LaneRule,
 ) -> Scenario:
     module = parse(source, version)
     chosen = decide_version(module)
     world = Modules(network, chosen, initial, loader, map_defaults=map_defaults and bool(network.features))
     run = world.interpreter
-    run.timed, run.gap_s = timed, gap_s
+    run.timed, run.gap_s, run.lanes = timed, gap_s, lanes
     try:
         library = None if world.is_model_named(module) else model or _left_out(module, chosen)
         names = {} if library is None else dict(world.load(library, _start(source)).names)

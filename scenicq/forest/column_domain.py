@@ -74,6 +74,7 @@ from scenicq.geometry.driven_courses import CoursePlace, measure
 from scenicq.geometry.fields import VectorField
 from scenicq.geometry.measures import MovingBoxes, time_to_collision
 from scenicq.geometry.membership import contains_many, distance_many
+from scenicq.geometry.occupancy import ElementAtPoint
 from scenicq.geometry.regions import SLACK, PolygonSet, Region
 from scenicq.geometry.terms import UndecidedError
 
@@ -271,7 +272,7 @@ class ColumnDomain:
     def on_map(self, node: OnMap, args: Sequence[Column]) -> Column:
         """What a region or vector field says of points or of other regions."""
         if isinstance(node, DirectionAt):
-            return self._direction(node, args[0], args[1])
+            return self._direction(node, *args)
         if isinstance(node, CourseCoordinate) and isinstance(args[0].data, Coded) and isinstance(args[1].data, tuple):
             return self._course_coordinate(node, args[0].data, args)
         if isinstance(node, Measure) and node.measure == "time_to_collision":
@@ -339,10 +340,10 @@ class ColumnDomain:
             status[places.defined[low != high]] = UNKNOWN
         return Column(data.reshape(places.shape), status.reshape(places.shape))
 
-    def _direction(self, node: DirectionAt, field: Column, point: Column) -> Column:
-        places = ColumnPlaces((field, point))
+    def _direction(self, node: DirectionAt, field: Column, point: Column, *going: Column) -> Column:
+        places = ColumnPlaces((field, point, *going))
         self._check(len(places.defined), "directions")
-        allowed = _allowed(places, field.data, point.data)
+        allowed = _allowed(places, field.data, point.data, *(each.data for each in going))
         most = max(map(len, allowed), default=1)
         counts = np.zeros(places.count, dtype=np.intp)
         counts[places.defined] = list(map(len, allowed))
@@ -436,13 +437,16 @@ def _picked(which: Array, options: Sequence[Array]) -> Array:
     return found
 
 
-def _allowed(places: ColumnPlaces, field: Data, point: Data) -> Sequence[tuple[float, ...]]:
+def _allowed(places: ColumnPlaces, field: Data, point: Data, going: Data | None = None) -> Sequence[tuple[float, ...]]:
     """The headings that a field allows at each defined place."""
     if not len(places.defined):
         return ()
     xy, fields = places.points(point), cast(Coded, field)
     only = fields.options[0] if len(fields.options) == 1 else None
     if only is not None and not isinstance(only, Undefined):
+        if isinstance(only, ElementAtPoint) and isinstance(going, np.ndarray):
+            # where there is no heading, it is nan
+            return [(each,) for each in only.along_many(xy, places.spread(going)[places.defined].tolist())]
         return cast(VectorField, only).values_many(xy)
     which: list[int] = places.spread(fields.which)[places.defined].tolist()
     found = [directions(fields.options[one], (x, y)) for one, (x, y) in zip(which, xy.tolist(), strict=True)]

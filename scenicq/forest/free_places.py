@@ -60,7 +60,7 @@ def _free_places(roots: list[Node]) -> dict[Identity, tuple[Occupancy, Constant]
                 continue
             field = node.field if isinstance(node, DirectionAt) else None
             ranked = field.value if isinstance(field, Constant) else None
-            if not (isinstance(ranked, ElementAtPoint) and isinstance(child.region, Constant)):
+            if not (isinstance(ranked, ElementAtPoint) and isinstance(child.region, Constant)) or ranked.by_heading:
                 others.add(child.identity)
                 continue
             known = found.setdefault(child.identity, (ranked.options, child.region))

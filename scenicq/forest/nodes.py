@@ -25,7 +25,7 @@ from scenicq.geometry.network import Network
 from scenicq.geometry.regions import Region
 
 __all__ = [
-    "CLOCK", "COURSE", "ELEMENT", "GIVEN", "IDENTITY", "MIRRORED", "PAST", "RANK", "TRACK", "WHO",
+    "CLOCK", "COURSE", "ELEMENT", "GIVEN", "GOING", "IDENTITY", "MIRRORED", "PAST", "RANK", "TRACK", "WHO",
     "Among", "AmongOp", "Arithmetic", "ArithmeticOp", "Bearing", "Body", "Compare", "CompareOp", "Constant", "Contains",
     "Coordinate", "Corridor", "CourseCoordinate", "DirectionAt", "DiscAt", "DiscreteRange", "Distance", "Encloses",
     "Feature", "Identity", "Index", "Intersects", "Kind", "LaneCourse", "Leaf", "Logic", "LogicOp", "Measure", "Node",
@@ -52,6 +52,8 @@ Value: TypeAlias = float | bool | str | Vector | Region | VectorField | CoursePl
 
 COURSE = "driven course"
 """The property of an object that is its course; no program can give one of such a name."""
+GOING = "way it goes"
+"""The property of an object that tells its lanes from others at its place: its heading, None where a label has none."""
 CLOCK = "time of the sample"
 """The property of any object that is the time of a sample, in seconds from a moment of its recording."""
 PAST = "past value of "
@@ -295,10 +297,15 @@ class Distance(_Scalar):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DirectionAt(_Scalar):
-    """The heading of a vector field at a point; where the field allows several, any of them."""
+    """The heading of a vector field at a point; where the field allows several, any of them.
+
+    Attributes:
+        going: Which way goes who is there, where that tells which of several elements is meant; else empty.
+    """
 
     field: Node
     point: Node
+    going: tuple[Node, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -5,8 +5,9 @@ goes wherever fields go: at an observed point it is one known option, and at a r
 looked at. The field's angles number the options; an angle times `scale` is the number, exactly.
 
 Where elements overlap, Scenic takes the first in the order of its lists, an accident; here each of them is allowed, and
-a rank says which (as with the directions of traffic). A point in none, but within the map's tolerance of some, counts
-as in these, as in Scenic; here the border is a polygon, so that the plane falls into convex pieces.
+a rank says which (as with the directions of traffic). Who is there and which way it goes may leave only some of them:
+those that lead within `ALONG` of its heading, if there are any. A point in none, but within the map's tolerance of
+some, counts as in these, as in Scenic; here the border is a polygon, so that the plane falls into convex pieces.
 """
 
 from __future__ import annotations
@@ -26,9 +27,13 @@ from scenicq.geometry.cells import convex_parts
 from scenicq.geometry.fields import FieldCell
 from scenicq.geometry.network import TOLERANCE
 from scenicq.geometry.regions import SLACK
+from scenicq.geometry.road_direction import RoadDirection
 from scenicq.geometry.shapes import Bounds, Shape
 
-__all__ = ["TOLERANCE", "ElementAtPoint", "Layer", "Occupancy", "OptionArea"]
+__all__ = ["ALONG", "TOLERANCE", "ElementAtPoint", "Layer", "Occupancy", "OptionArea"]
+
+ALONG = math.radians(60)
+"""How far a lane may lead from the heading of who is in it for it to be one of its own, where several are there."""
 
 _OVERLAP = 1e-6
 """Square metres that two elements may share without counting as overlapping."""
@@ -40,6 +45,10 @@ OptionArea: TypeAlias = tuple[Shape, int, int]
 """An area, the number of the option that is found in it, and whose area it is: an owner is found once at a point."""
 Layer: TypeAlias = tuple[OptionArea, ...]
 Corners: TypeAlias = NDArray[np.float64]
+_Point: TypeAlias = tuple[float, float]
+"""A point in metres."""
+_Meant: TypeAlias = tuple[bool, ...]
+"""Which of the options at a point may be meant."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,12 +75,14 @@ class Occupancy:
         nothing: The number that stands for no option at all.
         name: What messages call it.
         elements: The id of the map element that each area of each layer is, or a part of.
+        ways: The direction of each owner of areas of each layer, by its number; None where it has none.
     """
 
     layers: tuple[Layer, ...] = field(repr=False)
     nothing: int
     name: str
     elements: tuple[tuple[str, ...], ...] = field(default=(), repr=False)
+    ways: tuple[tuple[RoadDirection | None, ...], ...] = field(default=(), repr=False)
 
     @cached_property
     def scale(self) -> int:
@@ -117,11 +128,58 @@ class Occupancy:
             self._known_together[key] = known
         return known
 
-    def _find(self, xy: NDArray[np.float64], places: Sequence[tuple[float, float]]) -> list[tuple[int, ...]]:
-        """`at` for points (n, 2), which are kept by their places."""
+    def along(self, found: Sequence[tuple[int, ...]], places: Sequence[_Point], going: Sequence[float]) -> list[_Meant]:
+        """Which of the options at places lead the way that somebody goes: all, if none does.
+
+        Args:
+            found: The options, of which each place has several.
+            places: The places.
+            going: The headings.
+        """
+        new = [place for place in dict.fromkeys(places) if place not in self._known_ways]
+        if new:
+            self._find_ways(new)
+        meant: list[_Meant] = []
+        for options, place, heading in zip(found, places, going, strict=True):
+            ways = self._known_ways[place]
+            own = tuple(any(abs(math.remainder(way - heading, math.tau)) <= ALONG for way in each) for each in ways)
+            meant.append(own if any(own) else (True,) * len(options))
+        return meant
+
+    def _find_ways(self, places: Sequence[_Point]) -> None:
+        """The headings that each of several options at places leads in, which are kept by their places."""
+        if len(self._known_ways) + len(places) > _KEPT:
+            self._known_ways.clear()
+        owners: dict[_Point, tuple[int, tuple[int, ...]]] = {}
+        self._find(np.array(places), places, owners)
+        asked: dict[tuple[int, int], list[_Point]] = {}
+        for place, (level, numbers) in owners.items():
+            for number in numbers:
+                asked.setdefault((level, number), []).append(place)
+        said: dict[tuple[int, int, _Point], tuple[float, ...]] = {}
+        for (level, number), some in asked.items():
+            way = self.ways[level][number]
+            headings = [()] * len(some) if way is None else way.values_many(np.array(some))
+            said.update({(level, number, place): each for place, each in zip(some, headings, strict=True)})
+        for place, (level, numbers) in owners.items():
+            self._known_ways[place] = tuple(said[level, number, place] for number in numbers)
+
+    def _find(
+        self,
+        xy: NDArray[np.float64],
+        places: Sequence[_Point],
+        owners: dict[_Point, tuple[int, tuple[int, ...]]] | None = None,
+    ) -> list[tuple[int, ...]]:
+        """`at` for points (n, 2), which are kept by their places.
+
+        Args:
+            xy: The points.
+            places: The same as pairs.
+            owners: Gets for each point the number of the layer that counts there, and whose areas are found.
+        """
         found: list[tuple[int, ...]] = [(self.nothing,)] * len(places)
         left: NDArray[np.intp] = np.arange(len(places), dtype=np.intp)
-        for layer, tree in self._in_turn():
+        for turn, (layer, tree) in enumerate(self._in_turn()):
             if not len(left):
                 break
             here, hits = shapes.tree_pairs_within(tree, shapes.points(xy[left]), SLACK)
@@ -134,6 +192,8 @@ class Occupancy:
             for point, numbers in options.items():
                 if any(number != self.nothing for number in numbers.values()):
                     found[point] = tuple([numbers[owner] for owner in sorted(numbers)])
+                    if owners is not None:
+                        owners[places[point]] = turn % len(self.layers), tuple(sorted(numbers))
             left = left[[found[point] == (self.nothing,) for point in left.tolist()]]
         if len(self._known) + len(places) > _KEPT:
             self._known.clear()
@@ -265,6 +325,18 @@ class Occupancy:
         return [shape for shape in self._meeting(trees, area) if shape is not area and self._overlap(area, shape)]
 
     @cached_property
+    def spans(self) -> dict[str, tuple[float, float]]:
+        """By the id of each area of the first layer a heading, and how far from it its owner turns at most."""
+        found: dict[str, tuple[float, float]] = {}
+        known: dict[int, tuple[float, float]] = {}
+        for name, (_, _, owner) in zip(self.elements[0], self.layers[0], strict=True):
+            way = self.ways[0][owner]
+            if owner not in known:
+                known[owner] = (0.0, math.inf) if way is None else way.span
+            found[name] = known[owner]
+        return found
+
+    @cached_property
     def _trees(self) -> tuple[STRtree, ...]:
         return tuple(STRtree([area for area, _, _ in layer]) for layer in self.layers)
 
@@ -281,7 +353,11 @@ class Occupancy:
         return {}
 
     @cached_property
-    def _known(self) -> dict[tuple[float, float], tuple[int, ...]]:
+    def _known(self) -> dict[_Point, tuple[int, ...]]:
+        return {}
+
+    @cached_property
+    def _known_ways(self) -> dict[_Point, tuple[tuple[float, ...], ...]]:
         return {}
 
     @cached_property
@@ -295,10 +371,17 @@ class Occupancy:
 
 @dataclass(frozen=True, eq=False)
 class ElementAtPoint:
-    """One of the options at each point, by its rank among them: a vector field whose angles number the options."""
+    """One of the options at each point, by its rank among them: a vector field whose angles number the options.
+
+    Attributes:
+        options: The options.
+        rank: Which of them; where one that leads another way than who is there, the first that may be meant.
+        by_heading: Whether the way somebody goes says which of them may be meant.
+    """
 
     options: Occupancy
     rank: int
+    by_heading: bool = False
 
     @property
     def name(self) -> str:
@@ -320,13 +403,35 @@ class ElementAtPoint:
         rank, scale = self.rank, self.options.scale
         return [(found[rank % len(found)] / scale,) for found in self.options.at_many(xy)]
 
+    def along(self, x: float, y: float, heading: float) -> float:
+        """The angle that stands for the option at a point for who is there with a heading; nan if it has none."""
+        return self.along_many(np.array([[x, y]]), [heading])[0]
+
+    def along_many(self, xy: NDArray[np.float64], going: Sequence[float]) -> list[float]:
+        """`along` for points of shape (n, 2)."""
+        options, rank, scale = self.options, self.rank, self.options.scale
+        found = options.at_many(xy)
+        numbers = [each[rank % len(each)] for each in found]
+        several = [place for place, each in enumerate(found) if len(each) > 1 and not math.isnan(going[place])]
+        if several:
+            some = [found[place] for place in several]
+            places: list[_Point] = [(x, y) for x, y in xy[several].tolist()]
+            meant = options.along(some, places, [going[place] for place in several])
+            for place, mine, those in zip(several, some, meant, strict=True):
+                if not those[rank % len(mine)]:
+                    numbers[place] = mine[those.index(True)]
+        return [number / scale for number in numbers]
+
     def headings(self, boxes: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
         """Pairs (box, angle) that hold the angle of every option somewhere in each box, and few more; boxes (n, 4)."""
         owner, number = self.options.near(boxes)
         return owner, number / self.options.scale
 
     def cells_of(self, heading: float, bounds: Bounds) -> list[FieldCell]:
-        """Convex cells that hold every point within the bounds that has the option of an angle."""
+        """Convex cells that hold every point within the bounds that has the option of an angle.
+
+        Where headings matter, also points that have it only for some.
+        """
         number = round(heading * self.options.scale)
         if number == self.options.nothing:
             return self.cells(bounds)
@@ -352,7 +457,7 @@ class ElementAtPoint:
         return cells + [FieldCell(corners, options.nothing / scale) for corners in beside]
 
     def _is_meant(self, piece: Piece) -> bool:
-        return piece.found[self.rank % len(piece.found)] == piece.number
+        return self.by_heading or piece.found[self.rank % len(piece.found)] == piece.number
 
     @cached_property
     def _cells(self) -> dict[Bounds, list[FieldCell]]:

@@ -24,7 +24,19 @@ from scenicq.forest.condition import expand
 from scenicq.forest.course_ends import has_ends
 from scenicq.forest.ego_frame import DISTANCE, PLACE
 from scenicq.forest.interpret import OnMap, Steps, interpret, steps_of
-from scenicq.forest.nodes import COURSE, PAST, Among, DirectionAt, Feature, Identity, LaneCourse, Leaf, Node, Value
+from scenicq.forest.nodes import (
+    COURSE,
+    GOING,
+    PAST,
+    Among,
+    DirectionAt,
+    Feature,
+    Identity,
+    LaneCourse,
+    Leaf,
+    Node,
+    Value,
+)
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.temporal import Atom
 from scenicq.forest.unobserved import certain_and_possible
@@ -397,7 +409,10 @@ class AtomColumns:
             elif isinstance(seen, list):
                 self._features[key] = column_of(seen)
             else:
-                status = np.where(np.isnan(seen[0]), UNOBSERVED, DEFINED)
+                # who is there without a heading may go any way
+                there = self._seen(node.object, "position") if node.property == GOING else None
+                told = there[0] if isinstance(there, tuple) else seen[0]
+                status = np.where(np.isnan(told), UNOBSERVED, DEFINED)
                 self._features[key] = Column((seen[0], seen[1]) if len(seen) == 2 else seen[0], status)
         return self._features[key]
 

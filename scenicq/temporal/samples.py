@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 from scenicq.forest.among import LabelElements
 from scenicq.forest.columns import DEFINED, UNKNOWN, Column, column_of
 from scenicq.forest.ego_frame import PLACE
-from scenicq.forest.nodes import CLOCK, COURSE, PAST, RANK, TRACK, WHO, LaneCourse, Value
+from scenicq.forest.nodes import CLOCK, COURSE, GOING, PAST, RANK, TRACK, WHO, LaneCourse, Value
 from scenicq.store.classes import Granularity, class_truth
 from scenicq.store.track_block import TrackBlock
 from scenicq.store.tracks import RecordingTracks, TrackKey
 
 __all__ = ["FIXED", "MOVING", "WITH_COLUMNS", "Binding", "BoundSamples", "Observed", "Samples", "is_moving"]
 
-MOVING = WHO | {"position", "heading", "velocity", "speed", "angularSpeed", "acceleration", COURSE}
+MOVING = WHO | {"position", "heading", "velocity", "speed", "angularSpeed", "acceleration", COURSE, GOING}
 """Properties that change from sample to sample: where they are not observed, nothing is known of them."""
 
 
@@ -245,6 +245,8 @@ def _observed(
     if name in ("velocity", "speed"):
         vx, vy = column("motion_vx"), column("motion_vy")
         return (np.hypot(vx, vy),) if name == "speed" else (vx, vy)
+    if name == GOING:
+        return (column("heading"),)
     if name in _COLUMNS:
         found = column(_COLUMNS[name])
         return None if name not in MOVING and np.isnan(found).all() else (found,)

@@ -53,7 +53,8 @@ def by_hand(dataset: Dataset, sql: str) -> tuple[float, set[str]]:
 
 def ours(dataset: Dataset, text: str, options: MatchOptions, *, witnesses: bool) -> tuple[float, set[str]]:
     """CPU seconds of a query that is compiled, and the frames that it finds."""
-    query = Query(dataset, Source("p.scenic", text), QueryOptions(options, proofs=witnesses))
+    # what is written by hand takes any lane where the ego is
+    query = Query(dataset, Source("p.scenic", text), QueryOptions(options, lanes="any", proofs=witnesses))
     for plan in query.plans():
         query.blocks(plan.map)
     query.coverage()

@@ -24,7 +24,7 @@ from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.search import group_plan
 from scenicq.match.tolerance import EXACT, parse_tolerance
-from scenicq.match.verdict import Match, NoMatch
+from scenicq.match.verdict import Match, NoMatch, Verdict
 from scenicq.store.labels import Label, LabelObject
 
 from .scenes import compiled, network, refused
@@ -186,23 +186,19 @@ def test_overlapping_elements_are_each_allowed_and_one_at_a_time() -> None:
     assert len(here) > 1
     ego = label([("Car", *CROSSED, 0.3)])
     first, second = (f"require ego.lane is network.elements['{name}']\n" for name in here[:2])
+
+    def found(text: str) -> Verdict:
+        return Matcher(compiled(HEADER + ANY + text, lanes="any"), MatchOptions(tolerance=EXACT)).match(ego)
+
     for text, verdict in ((first, Match), (second, Match), (first + second, NoMatch)):
-        assert isinstance(Matcher(compiled(HEADER + ANY + text), MatchOptions(tolerance=EXACT)).match(ego), verdict), (
-            text
-        )
+        assert isinstance(found(text), verdict), text
     elsewhere = next(lane.id for lane in network().lanes if lane.id not in here)
     text = f"require ego.lane is network.elements['{elsewhere}']\n"
-    assert isinstance(Matcher(compiled(HEADER + ANY + text), MatchOptions(tolerance=EXACT)).match(ego), NoMatch)
+    assert isinstance(found(text), NoMatch)
     # the road and the section are those of the lane that is meant
     own = "require ego.road is ego.lane.road\nrequire ego.laneSection.lane is ego.lane\n"
-    assert isinstance(Matcher(compiled(HEADER + ANY + first + own), MatchOptions(tolerance=EXACT)).match(ego), Match)
-    assert isinstance(
-        Matcher(
-            compiled(HEADER + ANY + first + f"require ego.road.lanes[0] is network.elements['{here[1]}']\n"),
-            MatchOptions(tolerance=EXACT),
-        ).match(ego),
-        NoMatch,
-    )
+    assert isinstance(found(first + own), Match)
+    assert isinstance(found(first + f"require ego.road.lanes[0] is network.elements['{here[1]}']\n"), NoMatch)
 
 
 def fields(lookup: str) -> list[ElementAtPoint]:

@@ -107,7 +107,7 @@ def compiled(name: str, text: str, network: Network, version: int | None = None)
     Raises:
         ScenarioError: It is refused.
     """
-    return compile_scenario(Source(name, text), network, version=version)
+    return compile_scenario(Source(name, text), network, version=version, lanes="any")
 
 
 def tolerance_of(text: str) -> Tolerance:

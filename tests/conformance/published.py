@@ -168,7 +168,7 @@ def matched(drawing: Drawing, text: str, kept: dict[str, Any], town: Town, limit
     try:
         with patience(COMPILING_S):
             source = Source(drawing.program, text)
-            scenario = compile_scenario(source, town.network, initial=True)
+            scenario = compile_scenario(source, town.network, initial=True, lanes="any")
     except (ScenarioError, OutOfPatienceError) as error:
         row.said.append(f"not compiled: {error}")
         return row

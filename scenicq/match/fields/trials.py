@@ -94,7 +94,7 @@ class _Lazy(ColumnDomain):
         """What a region or vector field says of points or of other regions."""
         if id(node) in self.wanted:
             status = np.where(self.wanted[id(node)], args[1].status, UNDEFINED)
-            args = (args[0], Column(args[1].data, status))
+            args = (args[0], Column(args[1].data, status), *args[2:])
         return ColumnDomain.on_map(self, node, args)
 
 

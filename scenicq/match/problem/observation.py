@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from functools import lru_cache
 
-from scenicq.forest.nodes import COURSE, LaneCourse, Value
+from scenicq.forest.nodes import COURSE, GOING, LaneCourse, Value
 from scenicq.forest.scenario import Scenario
 from scenicq.geometry.driven_courses import CoursePlace
 from scenicq.store.labels import Label, LabelObject
@@ -16,6 +16,7 @@ __all__ = ["IN_COLUMNS", "course_rules", "observe", "observe_course", "observe_p
 
 IN_COLUMNS = frozenset({
     "position", "heading", "width", "length", "height", "velocity", "speed", "acceleration", "angularSpeed", COURSE,
+    GOING,
 })  # fmt: skip
 """What a label says in columns alone: an attribute of such a name is none of these."""
 
@@ -24,8 +25,9 @@ def observe(label_object: LabelObject) -> Mapping[str, Value]:
     """The properties that a label object has, by Scenic's names; what the source lacks is left out."""
     seen: dict[str, Value] = {"position": (float(label_object.x), float(label_object.y))}
     # one by one: all objects of all labels come here
+    seen[GOING] = None
     if label_object.heading is not None:
-        seen["heading"] = float(label_object.heading)
+        seen["heading"] = seen[GOING] = float(label_object.heading)
     if label_object.width is not None:
         seen["width"] = float(label_object.width)
     if label_object.length is not None:
@@ -85,7 +87,7 @@ def observed_names(label_object: LabelObject) -> frozenset[str]:
 def _names(present: tuple[bool, ...], attributes: tuple[str, ...]) -> frozenset[str]:
     parts = (("heading",), ("width",), ("length",), ("height",), ("velocity", "speed"), ("acceleration",))
     named = zip((*parts, ("angularSpeed",)), present, strict=False)
-    measured = ("position", *(name for names, there in named if there for name in names))
+    measured = ("position", GOING, *(name for names, there in named if there for name in names))
     return frozenset(measured).union(name for name in attributes if name not in IN_COLUMNS)
 
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scenicq.budget import look
 from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.groups import Constraint
-from scenicq.forest.nodes import COURSE, Identity, LaneCourse, Leaf, Value
+from scenicq.forest.nodes import COURSE, GOING, Identity, LaneCourse, Leaf, Value
 from scenicq.forest.scenario import Scenario
 from scenicq.limits import LIMITS
 from scenicq.match.decide.closed_form import ClosedForm, Evaluated
@@ -369,7 +369,9 @@ def _column(
     """
     rank = ranks[index]
     playing = [(row, mine[rank]) for row, mine in zip(rows, numbers, strict=True)]
-    if name not in _SCALARS and name != "position":
+    if name == GOING:
+        name = "heading"  # nan where there is none
+    elif name not in _SCALARS and name != "position":
         return _numeric([row.observed(number)[name] for row, number in playing])
     objects = [_label_object(row.label, number) for row, number in playing]
     if name == "position":

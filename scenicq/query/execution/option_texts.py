@@ -7,6 +7,7 @@ import shutil
 from collections.abc import Mapping
 from typing import Any, Literal, TypedDict, Unpack, get_args
 
+from scenicq.compiler.element_lookups import LaneRule
 from scenicq.compiler.temporal import REACTION_S, Behaviors
 from scenicq.errors import DataError, Diagnostic, SolverError
 from scenicq.forest.scenario import BuiltIn
@@ -53,6 +54,7 @@ class OptionTexts(TypedDict, total=False):
     scenic: str | None
     initial: bool
     map_defaults: bool
+    lanes: LaneRule
     ignore_params: str | None
     behaviors: Behaviors
     reaction: float | str
@@ -84,6 +86,7 @@ KINDS: Mapping[str, OptionKind] = {
     "scenic": OneOf(tuple(VERSIONS)),
     "initial": Flag(),
     "map_defaults": Flag(),
+    "lanes": OneOf(get_args(LaneRule)),
     "ignore_params": Text("names of parameters, separated by commas"),
     "behaviors": OneOf(get_args(Behaviors)),
     "reaction": Amount("s"),
@@ -164,7 +167,8 @@ def read_options(**given: Unpack[OptionTexts]) -> QueryOptions:
     )
     time = IntervalOptions(read.get("intervals", "longest"), read.get("min_duration"), read.get("gap", DEFAULT_GAP_S))
     same = (
-        "solver", "initial", "map_defaults", "prefilter", "jobs", "limit", "every", "all_matches", "strict", "model",
+        "solver", "initial", "map_defaults", "lanes", "prefilter", "jobs", "limit", "every", "all_matches", "strict",
+        "model",
     )  # fmt: skip
     values: dict[str, Any] = {name: value for name, value in read.items() if name in same}
     version = None if scenic is None else VERSIONS[scenic]

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from scenicq.compiler.absent import check_enforced
+from scenicq.compiler.element_lookups import LaneRule
 from scenicq.compiler.program import compile_scenario
 from scenicq.compiler.temporal import REACTION_S, Behaviors
 from scenicq.errors import DataError, Diagnostic, ScenarioError, Source
@@ -61,6 +62,7 @@ class QueryOptions:
         version: The version of Scenic; inferred if None.
         initial: Whether dynamic parts of the program are ignored.
         map_defaults: Whether the world model's classes place and turn their objects as the map has it.
+        lanes: Which of several lanes that contain an object are its own.
         prefilter: Whether SQL narrows the frames first; the results are the same.
         jobs: Processes that match; None for as many as pays.
         limit: Matches after which to stop; None for all.
@@ -84,6 +86,7 @@ class QueryOptions:
     version: Literal[1, 2, 3] | None = None
     initial: bool = False
     map_defaults: bool = True
+    lanes: LaneRule = "along"
     prefilter: bool = True
     jobs: int | None = 1
     limit: int | None = None
@@ -164,6 +167,7 @@ class Query:
                 self.source, network, version=self.options.version, initial=self.options.initial,
                 behaviors=self.options.behaviors, reaction_s=self.options.reaction_s, loader=self.siblings,
                 model=self.options.model, map_defaults=self.options.map_defaults, gap_s=self.options.time.gap_s,
+                lanes=self.options.lanes,
             )  # fmt: skip
             check_enforced(scenario, self.options.match.enforce)
         except ScenarioError as error:

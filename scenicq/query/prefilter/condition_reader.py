@@ -18,6 +18,7 @@ from scenicq.forest.ego_frame import DISTANCE, PLACE, in_ego_frame
 from scenicq.forest.groups import Comparison
 from scenicq.forest.interval_values import Interval, IntervalVector
 from scenicq.forest.nodes import (
+    GOING,
     Arithmetic,
     ArithmeticOp,
     Constant,
@@ -101,6 +102,7 @@ def object_columns(alias: str, prefix: str = "") -> dict[str, str | tuple[str, s
     found["velocity"] = (vx, vy)
     found["speed"] = f"sqrt({vx} * {vx} + {vy} * {vy})"
     found["acceleration"], found["angularSpeed"] = f"{start}acceleration", f"{start}yaw_rate"
+    found[GOING] = f"{start}heading"
     if not prefix:
         found[PLACE], found[DISTANCE] = (f"{start}ego_right", f"{start}ego_ahead"), f"{start}ego_distance"
     return found

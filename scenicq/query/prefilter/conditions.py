@@ -11,7 +11,7 @@ from dataclasses import replace
 
 from scenicq.errors import Span
 from scenicq.forest.groups import PARAMS, Comparison, Condition, Group
-from scenicq.forest.nodes import Select
+from scenicq.forest.nodes import Node, Select
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.walk import conjuncts, postorder
 from scenicq.geometry.network import Network
@@ -153,7 +153,18 @@ def _meant_elements(group: Group, ego: int) -> MeantElements | None:
     if not alike or ego not in objects or len(objects) != 1 + len(equations):
         return MeantElements(None, 1)
     among = frozenset(range(found[0].occupancy.nothing)).intersection(*(numbers for _, numbers in allowed))
-    return MeantElements(among, min(each.ranks for each in found), shared=bool(equations))
+    # what several ask for is one element: of several at the place each might be met by another one
+    asking = sum(
+        allowed_elements(part) is None and any(_looks_up(node) for node in postorder((part,)))
+        for each in group.constraints
+        for part in conjuncts(each.expression)
+    )
+    return MeantElements(among, min(each.ranks for each in found) if asking <= 1 else 1, shared=bool(equations))
+
+
+def _looks_up(node: Node) -> bool:
+    """Whether a node is the number of the element that lies somewhere."""
+    return look_up_of(node) is not None
 
 
 def _lacks(column: str, names: Sequence[str]) -> str | bool:

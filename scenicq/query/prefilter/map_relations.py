@@ -10,6 +10,7 @@ elements that may be meant (necessary), and of those that surely lie at the plac
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -33,7 +34,7 @@ from scenicq.forest.nodes import (
     Select,
 )
 from scenicq.forest.walk import children, is_leaf
-from scenicq.geometry.occupancy import TOLERANCE, ElementAtPoint, Occupancy
+from scenicq.geometry.occupancy import ALONG, TOLERANCE, ElementAtPoint, Occupancy
 from scenicq.geometry.regions import Region
 from scenicq.limits import LIMITS
 from scenicq.match.tolerance import SLACK
@@ -55,16 +56,19 @@ class LookUp:
         object: The object, by index.
         ranks: Any of so many elements at the place may be meant; where there are more, it is not known which.
         choice: What chooses among them; None where it is always the same.
+        by_heading: Whether the way that the object goes says which of several may be meant.
     """
 
     occupancy: Occupancy
     object: int
     ranks: int = 1
     choice: Identity | None = None
+    by_heading: bool = False
 
     def is_like(self, other: LookUp) -> bool:
         """Whether both are of one element."""
-        return self.occupancy is other.occupancy and self.object == other.object
+        same = self.occupancy is other.occupancy and self.object == other.object
+        return same and self.by_heading == other.by_heading
 
     def is_same(self, other: LookUp) -> bool:
         """Whether both always find the same element."""
@@ -89,7 +93,7 @@ def _of_rank(node: Node) -> LookUp | None:
             ArithmeticOp.MUL,
             (DirectionAt(Constant(ElementAtPoint() as one), Feature(property="position") as place), Constant()),
         ):
-            return LookUp(one.options, place.object)
+            return LookUp(one.options, place.object, by_heading=one.by_heading)
         case _:
             return None
 
@@ -182,19 +186,36 @@ class MapRelations:
         """Whether no condition asks for a table."""
         return not self._tables
 
-    def queries(self, rows: str) -> Iterator[tuple[str, str]]:
+    def queries(self, rows: str, labels: str, objects: str) -> Iterator[tuple[str, str]]:
         """The tables that conditions ask for, each with its query.
 
         Args:
             rows: The table of memberships of the ego and whoever may play a role, with the numbers `f` of their frames.
+            labels: The table of frames.
+            objects: The table of objects.
         """
         for table, name in self._tables.items():
             own = "object <> 'ego'" if table.everybody else "object = 'ego'"
             at = f"SELECT f, object, region, distance FROM {rows} WHERE {own} AND {_AT}"
             if table.first:
                 at = (
-                    f"SELECT f, object, region FROM ({at}) WHERE region IN {among_names(table.first, self.names)} "
-                    f"QUALIFY distance = 0 AND count(*) OVER (PARTITION BY f, object) <= {table.most}"
+                    "SELECT f, object, region, count(*) OVER (PARTITION BY f, object) AS several "
+                    f"FROM ({at}) WHERE region IN {among_names(table.first, self.names)} "
+                    f"QUALIFY distance = 0 AND several <= {table.most}"
+                )
+            if table.ways:
+                ways = self.names.table("source, heading, turn", *map(list, zip(*table.ways, strict=True)))
+                goes = (
+                    f"(SELECT l.number AS f, a.id AS object, a.heading FROM {objects} a JOIN {labels} l USING (frame))"
+                    if table.everybody
+                    else f"(SELECT number AS f, 'ego' AS object, ego_heading AS heading FROM {labels})"
+                )
+                off = "(g.heading - w.heading)"
+                off = f"abs({off} - 2 * pi() * round({off} / (2 * pi())))"
+                at = (
+                    f"SELECT f, object, p.region FROM ({at}) p JOIN {goes} g USING (f, object) "
+                    f"JOIN {ways} w ON w.source = p.region "
+                    f"WHERE several = 1 OR g.heading IS NULL OR {off} + w.turn <= {number(ALONG - SLACK)}"
                 )
             relation = self.names.table("source, region", *([pair[side] for pair in table.pairs] for side in (0, 1)))
             yield (
@@ -225,7 +246,7 @@ class MapRelations:
         regions = {place: ids for place, ids in regions.items() if place in among}
         if not meant.most and look_up.occupancy.nothing in regions:
             return None
-        table = self._table(look_up.occupancy, regions, meant.most)
+        table = self._table(look_up, regions, meant.most)
         if table is None:
             return None
         return f"((q.f, region) IN (SELECT f, region FROM {table}) AND distance <= {number(reach + SLACK)})"
@@ -251,7 +272,7 @@ class MapRelations:
         """A condition on frames: that one of some elements lies where the ego is, and may be the one that is meant."""
         if look_up.occupancy.nothing in among:
             return None
-        table = self._table(look_up.occupancy, dict.fromkeys(among, ("",)), most)
+        table = self._table(look_up, dict.fromkeys(among, ("",)), most)
         return None if table is None else f"(q.f IN (SELECT f FROM {table}))"
 
     def may_share(self, places: tuple[LookUp, LookUp], required: Sequence[Node]) -> str | None:
@@ -265,8 +286,7 @@ class MapRelations:
         there = [look_up for look_up, numbers in filter(None, found) if look_up.occupancy.nothing not in numbers]
         if not self._is_of_ego(places) or not any(place.is_like(each) for place in places for each in there):
             return None
-        occupancy = places[0].occupancy
-        table = self._table(occupancy, self._themselves(occupancy))
+        table = self._table(places[0], self._themselves(places[0].occupancy))
         return None if table is None else f"((q.f, region) IN (SELECT f, region FROM {table}) AND {_AT})"
 
     def surely_share(self, places: tuple[LookUp, LookUp], among: Collection[int], most: int) -> str | None:
@@ -279,9 +299,10 @@ class MapRelations:
         """
         if not self._is_of_ego(places):
             return None
-        occupancy = places[0].occupancy
-        own = {place: ids for place, ids in self._themselves(occupancy).items() if place in among}
-        ego, anybody = (self._table(occupancy, own, most, everybody=each) for each in (False, True))
+        own = {place: ids for place, ids in self._themselves(places[0].occupancy).items() if place in among}
+        mine = next(each for each in places if each.object == self.ego)
+        others = next(each for each in places if each is not mine)
+        ego, anybody = self._table(mine, own, most), self._table(others, own, most, everybody=True)
         if ego is None or anybody is None:
             return None
         theirs = f"(q.f, q.object, region) IN (SELECT f, object, region FROM {anybody})"
@@ -329,17 +350,17 @@ class MapRelations:
         return layers
 
     def _table(
-        self, occupancy: Occupancy, meant: Mapping[int, Sequence[str]], most: int = 0, *, everybody: bool = False
+        self, look_up: LookUp, meant: Mapping[int, Sequence[str]], most: int = 0, *, everybody: bool = False
     ) -> str | None:
         """The table of a relation: for each frame the regions that are meant where the ego is.
 
         Args:
-            occupancy: The elements.
+            look_up: Gives the element.
             meant: The regions that are meant, by element.
             most: Any of so many elements at the place may be meant, surely; 0 for what is possible.
             everybody: Whether it is of where all others are, instead.
         """
-        layers = self._sources(occupancy)
+        layers = self._sources(look_up.occupancy)
         if layers is None:
             return None
         # where an element of the first layer lies, no other layer counts
@@ -348,7 +369,18 @@ class MapRelations:
         if len(pairs) > LIMITS.related_regions:
             return None
         first = tuple(sorted({source for source, _ in layers[0]})) if most else ()
-        return self._tables.setdefault(_Table(tuple(pairs), first, most, everybody), f"meant{len(self._tables)}")
+        ways = self._ways(look_up.occupancy) if most and look_up.by_heading else ()
+        return self._tables.setdefault(_Table(tuple(pairs), first, most, everybody, ways), f"meant{len(self._tables)}")
+
+    def _ways(self, occupancy: Occupancy) -> tuple[tuple[str, float, float], ...]:
+        """The regions of the first layer, each with a heading, and how far from it its ways turn at most."""
+        known = self.names.elements
+        # a region that stands for several turns any way
+        spans: dict[str, tuple[float, float]] = {}
+        for element, span in occupancy.spans.items():
+            name = known[element]
+            spans[name] = (0.0, 2 * math.pi) if spans.get(name, span) != span else (span[0], min(span[1], 2 * math.pi))
+        return tuple((name, *span) for name, span in sorted(spans.items()))
 
 
 @dataclass(frozen=True, slots=True)
@@ -360,9 +392,12 @@ class _Table:
         first: The elements of the first layer, of which that one must be; empty where any of them will do.
         most: How many of these may lie at the place.
         everybody: Whether it is of where all others than the ego are.
+        ways: Where the way that somebody goes says which of several is meant: of each element of the first layer a
+            heading, and how far from it it turns at most.
     """
 
     pairs: tuple[tuple[str, str], ...]
     first: tuple[str, ...]
     most: int
     everybody: bool
+    ways: tuple[tuple[str, float, float], ...]

@@ -350,7 +350,7 @@ def _regions(
         # asked more than once
         statements.append(new_table("placings", rows))
         rows = "SELECT * FROM placings"
-        statements += [new_table(*each) for each in relations.queries("placings")]
+        statements += [new_table(*each) for each in relations.queries("placings", LABELS, OBJECTS)]
     statements.append(
         new_table(
             "flags",

@@ -10,11 +10,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from shapely import Point, union_all
 
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import ScenarioError, Source
 from scenicq.forest.evaluate import evaluate
-from scenicq.forest.nodes import Constant, Index, Node, PointIn, Select
+from scenicq.forest.nodes import GOING, Constant, Index, Node, PointIn, Select
 from scenicq.forest.walk import leaves
 from scenicq.geometry.regions import PolygonSet
 from scenicq.match.matcher import Matcher
@@ -205,7 +206,8 @@ def test_one_of_the_elements_at_a_place_is_meant_throughout(dataset: Dataset, sa
     chosen = {leaf.identity: len(leaf.weights) for leaf in leaves(*conditions) if isinstance(leaf, Index)}
     matcher, several = Matcher(scenario, MatchOptions()), 0
     for label in dataset.labels():
-        ego = {(0, "position"): (label.ego.x, label.ego.y), (0, "heading"): label.ego.heading}
+        heading = label.ego.heading
+        ego = {(0, "position"): (label.ego.x, label.ego.y), (0, "heading"): heading, (0, GOING): heading}
         right = any(
             all(evaluate(each, dict(zip(chosen, map(float, ranks), strict=True)), ego) is True for each in conditions)
             for ranks in itertools.product(*map(range, chosen.values()))
@@ -213,6 +215,28 @@ def test_one_of_the_elements_at_a_place_is_meant_throughout(dataset: Dataset, sa
         assert isinstance(matcher.match(label), Match) is right, label.frame
         several += right
     assert 0 < several < 150
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        "third = new Car in ego.lane, facing Range(-180, 180) deg\nrequire other.lane is ego.lane",
+        f"third = new Car {ANY}\nrequire other.lane is ego.lane\nrequire third.lane is ego.lane",
+    ],
+)
+def test_several_ask_for_one_element(tmp_path: Path, said: str):
+    """Two lanes hold the ego, and one car each."""
+    lanes = [lane for lane in STREET.lanes if lane.polygon.covers(Point(1.03, -6.57))]
+    alone = [lane.polygon.difference(union_all([each.polygon for each in lanes if each is not lane])) for lane in lanes]
+    spots = [part.representative_point() for part in alone if part.area > 0.5][:2]
+    assert len(spots) == 2
+    cars = tuple(LabelObject(f"{k}", "Car", "Car", spot.x, spot.y, 0.0, 2.0, 4.5) for k, spot in enumerate(spots))
+    ego = LabelObject("ego", "Car", "Car", 1.03, -6.57, 0.0, 2.0, 4.5)
+    made = Recording("r", STREET.name, (Label("0000", "r", 0, STREET.name, ego, cars),))
+    write_dataset(tmp_path / "d", iter([made]), {STREET.name: STREET.features}, name="d")
+    text = f"{HEAD}other = new Car {ANY}\n{said}\n"
+    for proofs in (False, True):
+        assert verdicts(open_dataset(tmp_path / "d"), text, MatchOptions(), proofs=proofs) == {}, proofs
 
 
 def test_sql_says_what_the_matcher_says(dataset: Dataset, rounds):
