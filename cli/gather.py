@@ -7,8 +7,8 @@ from pathlib import Path
 import click
 
 from scenicq.exporters.forms import FORMS
-from scenicq.query.execution.partitions import Gathered
-from scenicq.query.execution.partitions import gather as find_pieces
+from scenicq.query.execution.pieces import Gathered
+from scenicq.query.execution.pieces import gather as find_pieces
 from scenicq.query.execution.question_notes import noted_question
 from scenicq.query.execution.recorded_columns import columns_of_records
 from scenicq.query.execution.records import FrameRecord, IntervalRecord, read_record

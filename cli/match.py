@@ -20,11 +20,11 @@ from scenicq.errors import Diagnostic
 from scenicq.exporters.forms import FORMS
 from scenicq.match.verdict import Match, Unknown
 from scenicq.option_values import Amount, Count
+from scenicq.query.execution.executors import Executor, in_order, on_this_machine, resumed, usual_pieces
 from scenicq.query.execution.result_selection import ResultSelection, read_sort, read_where
 from scenicq.query.execution.result_summary import ResultSummary
 from scenicq.query.execution.results import Result, Sample
 from scenicq.query.execution.run import Query
-from scenicq.query.execution.shards import Engine, in_order, kept, run_here, shards_of
 from scenicq.store.atomic_files import sole_writer
 from scenicq.temporal.interval_options import DEFAULT_GAP_S
 
@@ -171,7 +171,7 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @click.pass_context
 def match(ctx: click.Context, scenario: str | None, dataset: str | None, *, program: str | None, format_: str | None,
           output: Path | None, export: tuple[str, Path] | None, near: int | None, deadline: float | None,
-          report: Path | None, shard: Shard | None, resume: bool, sensors: Path | None, engine: Engine | None,
+          report: Path | None, shard: Shard | None, resume: bool, sensors: Path | None, engine: Executor | None,
           explain: bool, advised: bool, where: str | None, sort: str | None, rank: bool, sample: int | None,
           diverse: bool, exit_zero: bool, summary: bool, quiet: bool, **given: Any) -> None:
     # fmt: on
@@ -228,9 +228,9 @@ def match(ctx: click.Context, scenario: str | None, dataset: str | None, *, prog
     if resume and file is not None:
         real = Path(os.path.realpath(file))
         pieces = real.with_name(f".{real.name}.pieces")
-        engine = kept(engine or run_here, pieces)
+        engine = resumed(pieces, engine or on_this_machine(query))
     bar = ProgressBar(query.dataset.manifest.total.frames, quiet=quiet)
-    results = in_order(query, engine, shards_of(query, 16), bar.advance) if engine else query.results(bar.advance)
+    results = in_order(query, engine, usual_pieces(query, 16), bar.advance) if engine else query.results(bar.advance)
     wanted = Wanted(file, chosen, export, report, pieces, sensors, ranked=rank)
     if selection is not None:
         results = _filtered(query, results, selection)

@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from scenicq.errors import DataError, Diagnostic
-from scenicq.query.execution.partitions import gather, is_done, partitions, write_partition
+from scenicq.query.execution.pieces import gather, is_done, partitions, write_piece
 from scenicq.query.execution.question_notes import name_question, note_question
 from scenicq.query.execution.records import Record, record
 from scenicq.query.execution.result_origin import name_origin
@@ -66,6 +66,6 @@ def run_shard(query: Query, shard: Shard, folder: Path, *, quiet: bool) -> tuple
     if not is_done(folder, question, piece.number, piece.count):
         query.recordings = piece.recordings
         with ProgressBar(piece.frames, quiet=quiet) as bar:
-            write_partition(folder, question, piece, _whole(query, shard, folder, bar), query)
+            write_piece(folder, question, piece, _whole(query, shard, folder, bar), query)
     gathered = gather(folder, question, only=piece.number)
     return gathered.funnel, gathered.summary

@@ -8,7 +8,7 @@ import msgspec
 from msgspec import Struct
 
 from scenicq.errors import DataError, Diagnostic, Source
-from scenicq.query.execution.partitions import fingerprint
+from scenicq.query.execution.pieces import fingerprint
 from scenicq.query.execution.program_files import SiblingFiles, program_text
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.atomic_files import made_folder, write_whole

@@ -1,6 +1,6 @@
-"""Running a query piece by piece: partitions, their files, and putting them together.
+"""Running a query piece by piece: the pieces of a dataset, their files, and putting them together.
 
-A partition is a run of recordings in the order of a query, so the pieces of a dataset are the same for everybody who
+A piece is a run of recordings in the order of a query, so the pieces of a dataset are the same for everybody who
 asks for the same number. Each finished piece is one file, written under a temporary name and renamed; whoever runs
 again does what is missing. Any launcher will do: a loop, xargs, an array of cluster jobs.
 """
@@ -30,11 +30,11 @@ from scenicq.query.execution.skipped_frames import summarize
 from scenicq.store.atomic_files import made_folder, whole_file
 from scenicq.store.dataset import Dataset
 
-__all__ = ["Gathered", "Partition", "fingerprint", "gather", "is_done", "partitions", "write_partition"]
+__all__ = ["Gathered", "Piece", "fingerprint", "gather", "is_done", "partitions", "write_piece"]
 
 
 @dataclass(frozen=True, slots=True)
-class Partition:
+class Piece:
     """One piece of a dataset.
 
     Attributes:
@@ -53,7 +53,7 @@ class Partition:
         return sum(stretch.frames for stretch in self.recordings.values())
 
 
-def partitions(dataset: Dataset, count: int) -> tuple[Partition, ...]:
+def partitions(dataset: Dataset, count: int) -> tuple[Piece, ...]:
     """At most `count` pieces of about the same number of frames; fewer where the dataset has fewer recordings.
 
     One after the other they hold the frames in the order in which a query finds them: map by map.
@@ -69,7 +69,7 @@ def partitions(dataset: Dataset, count: int) -> tuple[Partition, ...]:
         if seen * count >= total * len(cuts) or number == len(runs):
             cuts.append(number)
     pieces = [runs[low:high] for low, high in pairwise(cuts) if high > low]
-    return tuple(Partition(number, len(pieces), _ranges(piece)) for number, piece in enumerate(pieces))
+    return tuple(Piece(number, len(pieces), _ranges(piece)) for number, piece in enumerate(pieces))
 
 
 def _ranges(runs: Sequence[tuple[str, str, int]]) -> dict[str, RecordingRange]:
@@ -104,7 +104,7 @@ def is_done(folder: Path, question: str, number: int, count: int) -> bool:
     return _file(folder, question, number, count).exists()
 
 
-def write_partition(folder: Path, question: str, piece: Partition, records: Iterable[Record], query: Query) -> Path:
+def write_piece(folder: Path, question: str, piece: Piece, records: Iterable[Record], query: Query) -> Path:
     """Write a finished piece: one line a record, the funnel and the summary last.
 
     Args:
