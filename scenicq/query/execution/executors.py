@@ -9,17 +9,17 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable, Generator, Iterable
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 from scenicq.errors import Source
 from scenicq.processes import Lost, Workers, as_many_as_pay
-from scenicq.query.execution.pieces import Piece, gather, is_done, partitions, write_piece
+from scenicq.query.execution.pieces import Piece, finished, gather, partitions, write_piece
 from scenicq.query.execution.program_files import SiblingFiles
 from scenicq.query.execution.question_notes import name_question
 from scenicq.query.execution.records import read_record, record
 from scenicq.query.execution.results import Funnel, Result, up_to
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.dataset import DatasetReference
+from scenicq.store.remote_path import AnyPath
 
 __all__ = [
     "Asked",
@@ -144,18 +144,18 @@ def alone(query: Query, piece: Piece) -> Done:
     return run_piece(replace(query, options=replace(query.options, jobs=2)), piece)
 
 
-def resumed(folder: Path, executor: Executor) -> Executor:
+def resumed(folder: AnyPath, executor: Executor) -> Executor:
     """An executor that keeps pieces in a folder, and takes from there what is done already.
 
     Args:
-        folder: Made if need be.
+        folder: Here, made if need be, or elsewhere.
         executor: Who runs the others.
     """
 
     def run(query: Query, pieces: Iterable[Piece], progress: Progress) -> Generator[tuple[Piece, Done]]:
         question = name_question(query)
         every = tuple(pieces)
-        done = {piece.number for piece in every if is_done(folder, question, piece.number, piece.count)}
+        done = finished(folder, question, every)
         progress(sum(piece.frames for piece in every if piece.number in done))
         missing = [piece for piece in every if piece.number not in done]
         with contextlib.closing(executor(query, missing, progress)) as running:

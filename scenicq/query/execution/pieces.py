@@ -15,7 +15,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from itertools import groupby, pairwise
 from operator import itemgetter
-from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -29,8 +28,9 @@ from scenicq.query.execution.run import Query, QueryOptions, RecordingRange
 from scenicq.query.execution.skipped_frames import summarize
 from scenicq.store.atomic_files import made_folder, whole_file
 from scenicq.store.dataset import Dataset
+from scenicq.store.remote_path import AnyPath
 
-__all__ = ["Gathered", "Piece", "fingerprint", "gather", "is_done", "partitions", "write_piece"]
+__all__ = ["Gathered", "Piece", "fingerprint", "finished", "gather", "partitions", "write_piece"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,20 +95,26 @@ def fingerprint(dataset: Dataset, program: str, options: QueryOptions) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
-def _file(folder: Path, question: str, number: int, count: int) -> Path:
-    return folder / f"{question}-{number:05}-of-{count:05}.jsonl"
+def _name(question: str, number: int, count: int) -> str:
+    return f"{question}-{number:05}-of-{count:05}.jsonl"
 
 
-def is_done(folder: Path, question: str, number: int, count: int) -> bool:
-    """Whether a piece is finished."""
-    return _file(folder, question, number, count).exists()
+def finished(folder: AnyPath, question: str, pieces: Iterable[Piece]) -> frozenset[int]:
+    """The numbers of the pieces that are finished."""
+    there = {path.name for path in _files(folder)}
+    return frozenset(each.number for each in pieces if _name(question, each.number, each.count) in there)
 
 
-def write_piece(folder: Path, question: str, piece: Piece, records: Iterable[Record], query: Query) -> Path:
+def _files(folder: AnyPath) -> list[AnyPath]:
+    """The files of finished pieces, by name; elsewhere all of them cost one request, or few."""
+    return sorted(folder.glob("*-of-*.jsonl"), key=lambda path: path.name)
+
+
+def write_piece(folder: AnyPath, question: str, piece: Piece, records: Iterable[Record], query: Query) -> AnyPath:
     """Write a finished piece: one line a record, the funnel and the summary last.
 
     Args:
-        folder: Where the pieces are; made if need be.
+        folder: Where the pieces are, made if need be; here or elsewhere.
         question: Its `fingerprint`.
         piece: Which piece.
         records: Its results, in order.
@@ -117,7 +123,7 @@ def write_piece(folder: Path, question: str, piece: Piece, records: Iterable[Rec
     Raises:
         DataError: target-unwritable.
     """
-    target = _file(folder, question, piece.number, piece.count)
+    target = folder / _name(question, piece.number, piece.count)
     try:
         with made_folder(folder), whole_file(target) as file:
             counted = ResultCount()
@@ -148,7 +154,7 @@ class Gathered:
     """
 
     question: str
-    files: tuple[Path, ...]
+    files: tuple[AnyPath, ...]
     funnel: Funnel
     summary: ResultSummary | None
 
@@ -172,7 +178,7 @@ class _Piece:
     summary: ResultSummary | None
 
 
-def _piece(path: Path) -> _Piece:
+def _piece(path: AnyPath) -> _Piece:
     """The results in a file, and what was counted."""
     try:
         *lines, last = path.read_bytes().splitlines() or [b""]
@@ -190,7 +196,7 @@ def _counted(value: int | dict[str, int]) -> Any:
     return Counter(value) if isinstance(value, dict) else value
 
 
-def gather(folder: Path, question: str | None = None, *, only: int | None = None) -> Gathered:
+def gather(folder: AnyPath, question: str | None = None, *, only: int | None = None) -> Gathered:
     """Put the pieces in a folder together.
 
     Args:
@@ -201,7 +207,7 @@ def gather(folder: Path, question: str | None = None, *, only: int | None = None
     Raises:
         DataError: file-missing, naming the pieces that are missing; file-invalid for pieces of several questions.
     """
-    found = sorted(folder.glob("*-of-*.jsonl")) if folder.is_dir() else []
+    found = _files(folder)
     questions = sorted({path.name.rsplit("-", 3)[0] for path in found})
     if question is None and len(questions) > 1:
         raise DataError(Diagnostic("file-invalid", f"{folder} holds pieces of {len(questions)} different questions",
@@ -213,7 +219,8 @@ def gather(folder: Path, question: str | None = None, *, only: int | None = None
                                    hints=("run `scenicq match ... --shard i/n -o` with this folder",)))  # fmt: skip
     counts = {int(path.stem.rsplit("-", 1)[1]) for path in found}
     count = max(counts)
-    missing = [str(n + 1) for n in range(count) if not is_done(folder, chosen, n, count)]
+    there = {path.name for path in found}
+    missing = [str(n + 1) for n in range(count) if _name(chosen, n, count) not in there]
     if only is None and (missing or len(counts) > 1):
         shown = ", ".join(missing[:10]) + (" ..." if len(missing) > 10 else "")
         raise DataError(Diagnostic("file-missing", f"{len(missing)} of {count} pieces are missing: {shown}",
