@@ -1,6 +1,6 @@
 """Files and folders elsewhere that are written, or read as a whole: what a writer asks of a `Path`, over fsspec.
 
-An object appears with its whole content or not at all; nothing else is atomic there. Of what takes several objects
+An object appears with its whole content or not at all; nothing else is atomic there. Where there are several,
 `atomic_files` writes the last one when all others are there.
 """
 

@@ -33,7 +33,7 @@ from scenicq.errors import DataError, Diagnostic
 from scenicq.limits import LIMITS
 from scenicq.processes import processors
 from scenicq.query.execution.executors import Done, Executor, Progress, Question, alone, run_piece
-from scenicq.query.execution.pieces import Piece
+from scenicq.query.execution.pieces import DatasetPiece
 from scenicq.query.execution.run import Query
 from scenicq.store.read_lock import Reading, nobody_reads
 
@@ -66,7 +66,7 @@ def dask(address: str | None = None) -> Executor:
         message = f"`--engine dask` needs the package {missing[0]}, which is not installed"
         raise DataError(Diagnostic("option-invalid", message, hints=("`pip install 'scenicq[dask]'` adds it",)))
 
-    def run(query: Query, pieces: Iterable[Piece], progress: Progress) -> Generator[tuple[Piece, Done]]:
+    def run(query: Query, pieces: Iterable[DatasetPiece], progress: Progress) -> Generator[tuple[DatasetPiece, Done]]:
         with _quiet(), _client(query, address) as client:
             for piece, done in _run(client, query, pieces):
                 progress(piece.frames)
@@ -148,13 +148,13 @@ def _scratch() -> Generator[str]:
             using.end()
 
 
-def _run(client: Any, query: Query, pieces: Iterable[Piece]) -> Iterator[tuple[Piece, Done]]:
+def _run(client: Any, query: Query, pieces: Iterable[DatasetPiece]) -> Iterator[tuple[DatasetPiece, Done]]:
     """Hand out a bounded number of pieces ahead, and take what they give in order."""
     from distributed import CancelledError, KilledWorker  # noqa: PLC0415
 
     question = Question.of(query)
     waiting = iter(pieces)
-    pending: deque[tuple[Piece, Any]] = deque()
+    pending: deque[tuple[DatasetPiece, Any]] = deque()
     try:
         while True:
             room = 3 * max(1, _workers(client)) - len(pending)
@@ -231,7 +231,7 @@ def _workers(client: Any) -> int:
 _known = threading.local()
 
 
-def _work(question: Question, piece: Piece, client_version: str, machine: str, left_s: float) -> Done:
+def _work(question: Question, piece: DatasetPiece, client_version: str, machine: str, left_s: float) -> Done:
     """Run a piece in a worker, which keeps what it has compiled."""
     if __version__ != client_version:
         message = f"a worker has version {__version__} of scenicq, the client {client_version}"

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 from scenicq.errors import Source
 from scenicq.processes import Lost, Workers, as_many_as_pay
-from scenicq.query.execution.pieces import Piece, finished, gather, partitions, write_piece
+from scenicq.query.execution.pieces import DatasetPiece, finished, gather, partitions, write_piece
 from scenicq.query.execution.program_files import SiblingFiles
 from scenicq.query.execution.question_notes import name_question
 from scenicq.query.execution.records import read_record, record
@@ -82,14 +82,14 @@ class Question:
         return Query(self.dataset.open(), self.source, self.options, files=self.files)
 
 
-Asked = tuple[Question, Piece]
+Asked = tuple[Question, DatasetPiece]
 Progress = Callable[[int], None]
 """Called with the number of frames decided since the last call."""
-Executor = Callable[[Query, Iterable[Piece], Progress], Generator[tuple[Piece, Done]]]
+Executor = Callable[[Query, Iterable[DatasetPiece], Progress], Generator[tuple[DatasetPiece, Done]]]
 """Runs pieces of a query; they come in their order."""
 
 
-def usual_pieces(query: Query, least: int = 1) -> tuple[Piece, ...]:
+def usual_pieces(query: Query, least: int = 1) -> tuple[DatasetPiece, ...]:
     """The pieces that a query is run in.
 
     Args:
@@ -99,13 +99,13 @@ def usual_pieces(query: Query, least: int = 1) -> tuple[Piece, ...]:
     return partitions(query.dataset, max(least, query.dataset.manifest.total.frames // PIECE_FRAMES))
 
 
-def run_piece(query: Query, piece: Piece, progress: Progress | None = None) -> Done:
+def run_piece(query: Query, piece: DatasetPiece, progress: Progress | None = None) -> Done:
     """Run one piece here."""
     query.recordings, query.funnel = piece.recordings, Funnel()
     return list(query.results(progress)), query.funnel
 
 
-def here(query: Query, pieces: Iterable[Piece], progress: Progress) -> Generator[tuple[Piece, Done]]:
+def here(query: Query, pieces: Iterable[DatasetPiece], progress: Progress) -> Generator[tuple[DatasetPiece, Done]]:
     """Run pieces in this process."""
     own = replace(query, options=replace(query.options, jobs=1))
     for piece in pieces:
@@ -119,7 +119,7 @@ def processes(count: int) -> Executor:
         count: How many.
     """
 
-    def run(query: Query, pieces: Iterable[Piece], progress: Progress) -> Generator[tuple[Piece, Done]]:
+    def run(query: Query, pieces: Iterable[DatasetPiece], progress: Progress) -> Generator[tuple[DatasetPiece, Done]]:
         question = Question.of(query)
         workers: Workers[Asked, Done] = Workers(count, _start)
         with workers:
@@ -139,7 +139,7 @@ def on_this_machine(query: Query) -> Executor:
     return processes(jobs) if jobs > 1 else here
 
 
-def alone(query: Query, piece: Piece) -> Done:
+def alone(query: Query, piece: DatasetPiece) -> Done:
     """Run a piece that kills the processes which take it: only the frames that kill are unknown."""
     return run_piece(replace(query, options=replace(query.options, jobs=2)), piece)
 
@@ -152,7 +152,7 @@ def resumed(folder: AnyPath, executor: Executor) -> Executor:
         executor: Who runs the others.
     """
 
-    def run(query: Query, pieces: Iterable[Piece], progress: Progress) -> Generator[tuple[Piece, Done]]:
+    def run(query: Query, pieces: Iterable[DatasetPiece], progress: Progress) -> Generator[tuple[DatasetPiece, Done]]:
         question = name_question(query)
         every = tuple(pieces)
         done = finished(folder, question, every)
@@ -176,7 +176,7 @@ def resumed(folder: AnyPath, executor: Executor) -> Executor:
     return run
 
 
-def in_order(query: Query, executor: Executor, pieces: Iterable[Piece], progress: Progress) -> Generator[Result]:
+def in_order(query: Query, executor: Executor, pieces: Iterable[DatasetPiece], progress: Progress) -> Generator[Result]:
     """The results of a query that an executor runs, as `Query.results` gives them.
 
     Args:
@@ -188,7 +188,9 @@ def in_order(query: Query, executor: Executor, pieces: Iterable[Piece], progress
     return up_to(query.options.limit, _put_together(query, executor, pieces, progress), query.funnel)
 
 
-def _put_together(query: Query, executor: Executor, pieces: Iterable[Piece], progress: Progress) -> Generator[Result]:
+def _put_together(
+    query: Query, executor: Executor, pieces: Iterable[DatasetPiece], progress: Progress
+) -> Generator[Result]:
     with contextlib.closing(executor(query, pieces, progress)) as running:
         for _, (results, funnel) in running:
             query.funnel.add(funnel)

@@ -30,11 +30,11 @@ from scenicq.store.atomic_files import made_folder, whole_file
 from scenicq.store.dataset import Dataset
 from scenicq.store.remote_path import AnyPath
 
-__all__ = ["Gathered", "Piece", "fingerprint", "finished", "gather", "partitions", "write_piece"]
+__all__ = ["DatasetPiece", "Gathered", "fingerprint", "finished", "gather", "partitions", "write_piece"]
 
 
 @dataclass(frozen=True, slots=True)
-class Piece:
+class DatasetPiece:
     """One piece of a dataset.
 
     Attributes:
@@ -53,7 +53,7 @@ class Piece:
         return sum(stretch.frames for stretch in self.recordings.values())
 
 
-def partitions(dataset: Dataset, count: int) -> tuple[Piece, ...]:
+def partitions(dataset: Dataset, count: int) -> tuple[DatasetPiece, ...]:
     """At most `count` pieces of about the same number of frames; fewer where the dataset has fewer recordings.
 
     One after the other they hold the frames in the order in which a query finds them: map by map.
@@ -69,7 +69,7 @@ def partitions(dataset: Dataset, count: int) -> tuple[Piece, ...]:
         if seen * count >= total * len(cuts) or number == len(runs):
             cuts.append(number)
     pieces = [runs[low:high] for low, high in pairwise(cuts) if high > low]
-    return tuple(Piece(number, len(pieces), _ranges(piece)) for number, piece in enumerate(pieces))
+    return tuple(DatasetPiece(number, len(pieces), _ranges(piece)) for number, piece in enumerate(pieces))
 
 
 def _ranges(runs: Sequence[tuple[str, str, int]]) -> dict[str, RecordingRange]:
@@ -99,7 +99,7 @@ def _name(question: str, number: int, count: int) -> str:
     return f"{question}-{number:05}-of-{count:05}.jsonl"
 
 
-def finished(folder: AnyPath, question: str, pieces: Iterable[Piece]) -> frozenset[int]:
+def finished(folder: AnyPath, question: str, pieces: Iterable[DatasetPiece]) -> frozenset[int]:
     """The numbers of the pieces that are finished."""
     there = {path.name for path in _files(folder)}
     return frozenset(each.number for each in pieces if _name(question, each.number, each.count) in there)
@@ -110,7 +110,9 @@ def _files(folder: AnyPath) -> list[AnyPath]:
     return sorted(folder.glob("*-of-*.jsonl"), key=lambda path: path.name)
 
 
-def write_piece(folder: AnyPath, question: str, piece: Piece, records: Iterable[Record], query: Query) -> AnyPath:
+def write_piece(
+    folder: AnyPath, question: str, piece: DatasetPiece, records: Iterable[Record], query: Query
+) -> AnyPath:
     """Write a finished piece: one line a record, the funnel and the summary last.
 
     Args:

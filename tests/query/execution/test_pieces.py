@@ -12,7 +12,7 @@ from scenicq.importers.ingest import ingest
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import EXACT, parse_tolerance
 from scenicq.query.execution.executors import here, resumed
-from scenicq.query.execution.pieces import Piece, fingerprint, finished, gather, partitions, write_piece
+from scenicq.query.execution.pieces import DatasetPiece, fingerprint, finished, gather, partitions, write_piece
 from scenicq.query.execution.program_files import read_program
 from scenicq.query.execution.records import FrameRecord, record
 from scenicq.query.execution.run import Query, QueryOptions
@@ -30,7 +30,7 @@ def dataset(tmp_path_factory) -> Dataset:
     return open_dataset(target)
 
 
-def run_piece(dataset: Dataset, folder: Path, piece: Piece, options: QueryOptions = OPTIONS) -> Path:
+def run_piece(dataset: Dataset, folder: Path, piece: DatasetPiece, options: QueryOptions = OPTIONS) -> Path:
     source = read_program(PROGRAM)
     query = Query(dataset, source, options, recordings=piece.recordings)
     question = fingerprint(dataset, source.text, options)
