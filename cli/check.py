@@ -30,6 +30,7 @@ from scenicq.store.dataset import Dataset
 from .datasets import open_checked
 from .main import ERROR
 from .manual import Manual
+from .path_type import LOCAL_PATH
 from .programs import MAP_DEFAULTS, PROGRAM_TEXT, SCENARIO, given_program
 from .report import as_json, count, show
 from .streams import say
@@ -193,7 +194,7 @@ def _found(
 @click.argument("scenario", metavar="SCENARIO", type=click.Path(), required=False)
 @click.argument("dataset", metavar="[DATASET]", type=click.Path(), required=False)
 @PROGRAM_TEXT
-@click.option("--map", "map_file", metavar="FILE", type=click.Path(path_type=Path), help="A GeoJSON or OpenDRIVE map.")
+@click.option("--map", "map_file", metavar="FILE", type=LOCAL_PATH, help="A GeoJSON or OpenDRIVE map.")
 @click.option("--scenic", type=click.Choice(["1", "2", "3"]), help="Version of Scenic.  [default: inferred]")
 @MAP_DEFAULTS
 @click.option("--initial", is_flag=True, help="Ignore behaviors and other dynamic parts.")

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import click
 
 from scenicq.query.execution.result_files import read_results
 from scenicq.report.changes import changes, changes_page, changes_text, check_complete, check_datasets
+from scenicq.store.remote_path import AnyPath
 
 from .manual import Manual
 from .output import destination, writing
+from .path_type import ANY_PATH
 from .report import plain, show
 from .streams import say
 
@@ -25,11 +25,11 @@ __all__ = ["report"]
     "  scenicq report before.jsonl after.jsonl\n"
     "  scenicq report before.jsonl after.jsonl --all -o changes.html",
 )
-@click.argument("before", metavar="A", type=click.Path(path_type=Path))
-@click.argument("after", metavar="B", type=click.Path(path_type=Path))
+@click.argument("before", metavar="A", type=ANY_PATH)
+@click.argument("after", metavar="B", type=ANY_PATH)
 @click.option("--all", "every", is_flag=True, help="List the frames that stayed, too.")
-@click.option("-o", "--output", metavar="FILE", type=click.Path(path_type=Path), help="Write a page of HTML to a file.")
-def report(before: Path, after: Path, *, every: bool, output: Path | None) -> None:
+@click.option("-o", "--output", metavar="FILE", type=ANY_PATH, help="Write a page of HTML to a file, also to s3://...")
+def report(before: AnyPath, after: AnyPath, *, every: bool, output: AnyPath | None) -> None:
     """Say which matches came, went and stayed between two result files.
 
     This shows what a changed line of a program did. With `match --all` the files also say why a frame does not match.

@@ -21,6 +21,7 @@ from scenicq.query.execution.results import Funnel, Result
 from scenicq.query.execution.run import Query
 from scenicq.query.execution.skipped_frames import summarize
 from scenicq.store.atomic_files import sole_writer
+from scenicq.store.remote_path import AnyPath
 
 from .formats import make_writer
 from .main import NOTHING, UNDECIDED
@@ -45,11 +46,11 @@ class Wanted:
         ranked: Whether results have a density.
     """
 
-    file: Path | None
+    file: AnyPath | None
     form: str
-    export: tuple[str, Path] | None = None
-    report: Path | None = None
-    work: Path | None = None
+    export: tuple[str, AnyPath] | None = None
+    report: AnyPath | None = None
+    work: AnyPath | None = None
     sensors: Path | None = None
     ranked: bool = False
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import click
 
-from scenicq.query.execution.dask_engine import dask_engine
-from scenicq.query.execution.shards import Engine
+from scenicq.query.execution.dask_executor import dask
+from scenicq.query.execution.executors import Executor
 
 __all__ = ["parse_engine"]
 
 
-def parse_engine(_ctx: click.Context, _parameter: click.Parameter, text: str | None) -> Engine | None:
+def parse_engine(_ctx: click.Context, _parameter: click.Parameter, text: str | None) -> Executor | None:
     """Read `dask` or `dask=ADDRESS`.
 
     Raises:
@@ -21,4 +21,4 @@ def parse_engine(_ctx: click.Context, _parameter: click.Parameter, text: str | N
     name, equals, address = text.partition("=")
     if name != "dask" or (equals and not address):
         raise click.BadParameter("write dask, or dask=ADDRESS of a scheduler, as in dask=tcp://10.0.0.1:8786")
-    return dask_engine(address or None)
+    return dask(address or None)

@@ -25,13 +25,16 @@ from scenicq.option_values import MARGIN_OPTION, SCORE, SEED
 from scenicq.query.execution.option_texts import read_options
 from scenicq.query.execution.run import Query
 from scenicq.report.write import check_target
+from scenicq.store.atomic_files import check_writable
 from scenicq.store.dataset import Dataset
+from scenicq.store.remote_path import AnyPath
 
 from .datasets import open_checked
 from .formats import CsvRows
 from .manual import Manual
 from .option_type import OptionType
 from .output import choose_format, destination, writing
+from .path_type import ANY_PATH, LOCAL_PATH, chosen_file
 from .programs import read_scenario
 from .report import columns, plain, show
 from .sources import SENSORS, sensor_root
@@ -61,9 +64,9 @@ _EXTENSIONS = {".json": "json"}
     "  scenicq evaluate parked.jsonl cutin.jsonl dataset --predictions detections.feather --simulated runs.csv\n"
     "  scenicq evaluate parked.jsonl dataset --predictions detections.jsonl --report pages -o figures.json",
 )
-@click.argument("results", metavar="RESULTS...", type=click.Path(path_type=Path), nargs=-1, required=True)
+@click.argument("results", metavar="RESULTS...", type=ANY_PATH, nargs=-1, required=True)
 @click.argument("dataset", type=click.Path())
-@click.option("--predictions", metavar="FILE", type=click.Path(path_type=Path), required=True,
+@click.option("--predictions", metavar="FILE", type=LOCAL_PATH, required=True,
               help="Detections of a model: nuScenes results (.json), Argoverse 2 (.feather), or labels of the "
               "interchange format whose objects have a `score` (.jsonl or .parquet).")
 @click.option("--distance", metavar="M[,CLASS=M]", type=OptionType(DISTANCES), default="2",
@@ -73,7 +76,7 @@ _EXTENSIONS = {".json": "json"}
               help="Score from which a detection counts, but for average precision; all by default.")
 @click.option("--missing", type=click.Choice(["error", "empty", "skip"]), default="error",
               help="What a frame without detections is: an error, a frame in which nothing was found, or left out.")
-@click.option("--simulated", metavar="FILE", type=click.Path(path_type=Path),
+@click.option("--simulated", metavar="FILE", type=LOCAL_PATH,
               help="Simulated runs to set beside it: CSV with `scenario` (the name of a results file) and `failed` or "
               "`score` (the share missed, 0 to 1).")
 @click.option("--cluster", metavar="KEY",
@@ -86,13 +89,14 @@ _EXTENSIONS = {".json": "json"}
 @click.option("--format", "format_", metavar="NAME", type=click.Choice(_FORMATS),
               help="table, json, csv, spreadsheet (csv without formulas) or parquet.  [default: by the extension of "
               "FILE, else table]")
-@click.option("-o", "--output", metavar="FILE", type=click.Path(path_type=Path), help="Write to a file.")
-@click.option("--report", metavar="DIR", type=click.Path(path_type=Path),
-              help="Write a page with pictures, too, the worst frames first: DIR/index.html.")
+@click.option("-o", "--output", metavar="FILE", type=ANY_PATH, help="Write to a file, also to s3://...")
+@click.option("--report", metavar="DIR", type=ANY_PATH,
+              help="Write a page with pictures, too, the worst frames first: DIR/index.html, also in s3://...")
 @SENSORS
-def evaluate(results: tuple[Path, ...], dataset: str, *, predictions: Path, distance: dict[str, float],
+def evaluate(results: tuple[AnyPath, ...], dataset: str, *, predictions: Path, distance: dict[str, float],
              least_score: float | None, missing: str, simulated: Path | None, cluster: str | None, margin: float,
-             seed: int, format_: str | None, output: Path | None, report: Path | None, sensors: Path | None) -> None:
+             seed: int, format_: str | None, output: AnyPath | None, report: AnyPath | None,
+             sensors: Path | None) -> None:
     # fmt: on
     """Say whether a model fails on the frames that match.
 
@@ -101,7 +105,7 @@ def evaluate(results: tuple[Path, ...], dataset: str, *, predictions: Path, dist
     one recording resemble each other: intervals (95 %) and tests are over recordings. Where these cannot tell, it says
     what is missing. The tests of one command are corrected for each other, those of several commands are not.
     """
-    file = None if output is None or str(output) == "-" else output
+    file = chosen_file(output)
     form = _format(format_, file)
     names = [each.stem for each in results]
     if len(set(names)) < len(names):
@@ -109,6 +113,8 @@ def evaluate(results: tuple[Path, ...], dataset: str, *, predictions: Path, dist
         raise DataError(Diagnostic("option-invalid", message))
     if report is not None:
         check_target(report)
+    if file is not None:
+        check_writable(file)
     opened = open_checked(dataset)
     found = judge(
         {name: _asked(each, opened) for name, each in zip(names, results, strict=True)},
@@ -129,12 +135,12 @@ def evaluate(results: tuple[Path, ...], dataset: str, *, predictions: Path, dist
         write_pages(found, opened, report, sensor_root(opened, sensors))
 
 
-def _asked(path: Path, dataset: Dataset) -> Results:
+def _asked(path: AnyPath, dataset: Dataset) -> Results:
     """Results, or a program to be matched."""
-    return Query(dataset, read_scenario(path), read_options()) if path.suffix == ".scenic" else path
+    return Query(dataset, read_scenario(str(path)), read_options()) if path.suffix == ".scenic" else path
 
 
-def _format(name: str | None, file: Path | None) -> str:
+def _format(name: str | None, file: AnyPath | None) -> str:
     if name is not None:
         return "parquet" if name == "parquet" and choose_format(name, file) else name
     if file is None:

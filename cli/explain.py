@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import click
@@ -16,12 +15,15 @@ from scenicq.query.explain.frame_explanation import explain as explain_label
 from scenicq.query.explain.frame_explanation import show_explanation
 from scenicq.query.explain.interval_explanation import explain_beginning, explain_recording
 from scenicq.query.explain.moments import named_frame, named_moment
+from scenicq.store.atomic_files import made_folder, write_whole
+from scenicq.store.remote_path import AnyPath
 
 from .datasets import open_checked
 from .main import NOTHING, UNDECIDED
 from .manual import Manual
 from .match import match
 from .options import ONE_FRAME, OVER_TIME, SHARED, query_options
+from .path_type import ANY_PATH
 from .programs import PROGRAM_TEXT, SCENARIO, given_program
 from .remarks import remarks, show_remarks
 from .report import plain
@@ -57,13 +59,13 @@ __all__ = ["explain"]
 @click.argument("dataset", metavar="DATASET", type=click.Path(), required=False)
 @click.argument("frame", metavar="FRAME", required=False)
 @PROGRAM_TEXT
-@click.option("--smt2", metavar="DIR", type=click.Path(path_type=Path, file_okay=False),
-              help="Write the formula of each group as SMT-LIB 2 into a folder.")  # fmt: skip
+@click.option("--smt2", metavar="DIR", type=ANY_PATH,
+              help="Write the formula of each group as SMT-LIB 2 into a folder, here or elsewhere.")  # fmt: skip
 @click.option("--exit-zero", is_flag=True, help="Exit with 0 also where the frame does not match.")
 @click.pass_context
 def explain(
     ctx: click.Context, scenario: str | None, dataset: str | None, frame: str | None, *, program: str | None,
-    smt2: Path | None, exit_zero: bool, **given: Any
+    smt2: AnyPath | None, exit_zero: bool, **given: Any
 ) -> None:  # fmt: skip
     """Say why a frame or recording matches, or what keeps it from it and what would do.
 
@@ -90,9 +92,9 @@ def explain(
     say(plain(told))
     if smt2 is not None:
         try:
-            smt2.mkdir(parents=True, exist_ok=True)
-            for formula in explanation.formulas:
-                (smt2 / f"{formula.name}.smt2").write_text(formula.text, encoding="utf-8")
+            with made_folder(smt2):
+                for formula in explanation.formulas:
+                    write_whole(smt2 / f"{formula.name}.smt2", formula.text)
         except OSError as error:
             raise DataError(Diagnostic("target-unwritable", f"{smt2} cannot be written: {error.strerror}")) from None
     if not isinstance(verdict, Match) and not exit_zero:

@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
+from collections.abc import Generator
 from pathlib import Path
 
 import click
 
+from scenicq.errors import DataError, Diagnostic
 from scenicq.importers.ingest import IngestSummary
 from scenicq.importers.ingest import ingest as make_dataset
 from scenicq.option_values import Count
-from scenicq.store.manifest import LeftOut
+from scenicq.store.atomic_files import check_writable, is_taken, whole_folder
+from scenicq.store.manifest import MANIFEST, LeftOut
+from scenicq.store.remote_path import AnyPath, RemotePath
 
 from .manual import Manual
 from .option_type import OptionType
 from .output import ProgressBar
+from .path_type import ANY_PATH, LOCAL_PATH, check_here
 from .report import columns, count, show_few
 from .sources import remember
 from .user_folders import map_cache
@@ -33,10 +39,10 @@ def defects(left_out: tuple[LeftOut, ...]) -> list[str]:
     return lines
 
 
-def _lines(summary: IngestSummary, elapsed_s: float) -> list[str]:
+def _lines(target: AnyPath, summary: IngestSummary, elapsed_s: float) -> list[str]:
     rows = sorted(summary.by_class.items(), key=lambda item: (-item[1], item[0]))
     return [
-        f"{summary.target}: {count(summary.frames, 'frame')}, {count(summary.objects, 'object')}, "
+        f"{target}: {count(summary.frames, 'frame')}, {count(summary.objects, 'object')}, "
         f"{count(summary.tracks, 'track')} in {count(summary.recordings, 'recording')}, "
         f"read as {summary.importer} in {elapsed_s:.1f} s",
         *columns([(name, f"{number:,}") for name, number in rows], right=frozenset({1})),
@@ -44,18 +50,41 @@ def _lines(summary: IngestSummary, elapsed_s: float) -> list[str]:
     ]
 
 
+def _check_new(dataset: RemotePath, *, force: bool, update: bool) -> None:
+    """Refuse a place elsewhere that is not new or cannot be written, before the work."""
+    if force or update:
+        message = f"{dataset} lies elsewhere, where a dataset is made new, and neither replaced nor updated"
+        hint = "update it on this machine, and copy it there, `dataset.json` last"
+        raise DataError(Diagnostic("option-invalid", message, hints=(hint,)))
+    if is_taken(dataset):
+        hint = "choose another name: nothing elsewhere is replaced"
+        raise DataError(Diagnostic("target-exists", f"{dataset} exists", hints=(hint,)))
+    check_writable(dataset)
+
+
+@contextlib.contextmanager
+def _target(dataset: AnyPath) -> Generator[Path]:
+    """The folder in which a dataset is made; one of this machine that is sent afterwards, its manifest last."""
+    if isinstance(dataset, Path):
+        yield dataset
+        return
+    with whole_folder(dataset, MANIFEST) as folder:
+        folder.rmdir()  # ingest makes it
+        yield folder
+
+
 @click.command(
     cls=Manual,
     arguments={
         "SOURCE": "A folder or file of recordings; its format is recognised.",
-        "DATASET": "The folder to be made.",
+        "DATASET": "The folder to be made, here or elsewhere (s3://...): there it must be new.",
     },
     epilog="\b\nExamples:\n"
     "  scenicq ingest sample_data/crossroads dataset\n"
     "  scenicq ingest recordings dataset --map town=town.geojson --jobs 4",
 )
-@click.argument("source", type=click.Path(path_type=Path))
-@click.argument("dataset", type=click.Path(path_type=Path))
+@click.argument("source", type=LOCAL_PATH)
+@click.argument("dataset", type=ANY_PATH)
 @click.option("--format", "format_", metavar="NAME", help="Format of the source.  [default: recognised]")
 @click.option(
     "--map",
@@ -67,7 +96,7 @@ def _lines(summary: IngestSummary, elapsed_s: float) -> list[str]:
 @click.option(
     "--class-map",
     metavar="FILE",
-    type=click.Path(path_type=Path),
+    type=LOCAL_PATH,
     help="A JSON file {class of the source: class of the tree}.",
 )
 @click.option(
@@ -86,7 +115,7 @@ def _lines(summary: IngestSummary, elapsed_s: float) -> list[str]:
 @click.option("--force", is_flag=True, help="Replace a dataset that is there already.")
 @click.option("--update", is_flag=True, help="Add what is new in the source to the dataset that is there already.")
 @click.option("-q", "--quiet", is_flag=True, help="No progress, no summary, no warnings.")
-def ingest(source: Path, dataset: Path, *, format_: str | None, maps: tuple[str, ...], class_map: Path | None,
+def ingest(source: Path, dataset: AnyPath, *, format_: str | None, maps: tuple[str, ...], class_map: Path | None,
            ego: str | None, strict: bool, jobs: int | None, force: bool, update: bool,
            quiet: bool) -> None:  # fmt: skip
     """Make a dataset from a source, such as a nuScenes folder.
@@ -94,10 +123,14 @@ def ingest(source: Path, dataset: Path, *, format_: str | None, maps: tuple[str,
     The dataset appears when it is complete: an error or an interrupt leaves what was there before.
     """
     started = time.perf_counter()
-    with ProgressBar(quiet=quiet) as bar, map_cache() as cache:
+    for each in maps:
+        check_here(each.partition("=")[2] or each)
+    if isinstance(dataset, RemotePath):
+        _check_new(dataset, force=force, update=update)
+    with ProgressBar(quiet=quiet) as bar, map_cache() as cache, _target(dataset) as target:
         summary = make_dataset(
             source,
-            dataset,
+            target,
             format=format_,
             maps=maps,
             class_map=class_map,
@@ -109,7 +142,8 @@ def ingest(source: Path, dataset: Path, *, format_: str | None, maps: tuple[str,
             jobs=jobs,
             progress=lambda progress: bar.reach(progress.frames, progress.total),
         )
-    remember(dataset, source)
+    if isinstance(dataset, Path):
+        remember(dataset, source)
     if not quiet:
         show_few(summary.diagnostics)
-        click.echo("\n".join(_lines(summary, time.perf_counter() - started)), err=True)
+        click.echo("\n".join(_lines(dataset, summary, time.perf_counter() - started)), err=True)

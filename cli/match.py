@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import shutil
 import sys
 import time
 from collections import Counter
@@ -20,12 +19,13 @@ from scenicq.errors import Diagnostic
 from scenicq.exporters.forms import FORMS
 from scenicq.match.verdict import Match, Unknown
 from scenicq.option_values import Amount, Count
+from scenicq.query.execution.executors import Executor, in_order, on_this_machine, resumed, usual_pieces
 from scenicq.query.execution.result_selection import ResultSelection, read_sort, read_where
 from scenicq.query.execution.result_summary import ResultSummary
 from scenicq.query.execution.results import Result, Sample
 from scenicq.query.execution.run import Query
-from scenicq.query.execution.shards import Engine, in_order, kept, run_here, shards_of
-from scenicq.store.atomic_files import sole_writer
+from scenicq.store.atomic_files import remove_folder, sole_writer
+from scenicq.store.remote_path import AnyPath
 from scenicq.temporal.interval_options import DEFAULT_GAP_S
 
 from .advise import advise, is_nearly_empty
@@ -40,6 +40,7 @@ from .manual import OPEN, Manual
 from .option_type import OptionType
 from .options import DEFAULTS, TOPICS, option_type, query_options
 from .output import ProgressBar, choose_format
+from .path_type import ANY_PATH, chosen_file
 from .pieces import LateShardError, Shard, parse_shard, run_shard
 from .plan import show_plan
 from .programs import LANES, MAP_DEFAULTS, PROGRAM_TEXT, SCENARIO, given_program
@@ -133,20 +134,20 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @click.option("--format", "format_", metavar="NAME", type=click.Choice(FORMATS),
               help="table, jsonl, csv, spreadsheet, parquet or ids.  [default: by the extension of FILE, else table on "
               f"a terminal and jsonl in a pipe]  {SPREADSHEET_HELP}")
-@click.option("-o", "--output", metavar="FILE", type=click.Path(path_type=Path),
-              help="Write to a file, which appears when it is complete; `-` is standard output.")
+@click.option("-o", "--output", metavar="FILE", type=ANY_PATH,
+              help="Write to a file, also to s3://..., which appears when it is complete; `-` is standard output.")
 @click.option("--shard", metavar="I/N", callback=parse_shard, help="Match only piece I of N; -o names the folder for "
               "the pieces, which `scenicq gather` puts together.")
 @click.option("--engine", metavar="dask[=ADDRESS]", callback=parse_engine, help="Match in pieces on Dask: in processes "
               "on this machine (--jobs of them, or one a processor), or on the cluster whose scheduler is at ADDRESS.")
 @click.option("--resume", is_flag=True, help="Go on where an interrupted run with the same -o FILE stopped.")
-@click.option("--export", metavar="FORM DIR", type=(click.Choice(FORMS), click.Path(path_type=Path)),
-              help="Hand the matching frames on, too, in a new folder DIR: nuscenes-tokens, argoverse2, paths (of "
-              "sensor files), interchange (to ingest elsewhere) or openlabel.")
+@click.option("--export", metavar="FORM DIR", type=(click.Choice(FORMS), ANY_PATH),
+              help="Hand the matching frames on, too, in a new folder DIR, also s3://...: nuscenes-tokens, argoverse2, "
+              "paths (of sensor files), interchange (to ingest elsewhere) or openlabel.")
 @click.option("--explain", is_flag=True,
               help="Print what SQL decides and what stays for the matcher, and match nothing.")
-@click.option("--report", metavar="DIR", type=click.Path(path_type=Path),
-              help="Write a page with pictures of the matches, too: DIR/index.html.")
+@click.option("--report", metavar="DIR", type=ANY_PATH,
+              help="Write a page with pictures of the matches, too: DIR/index.html, also in s3://...")
 @SENSORS
 @click.option("--scenic", type=option_type("scenic"), help="Version of Scenic.  [default: inferred]")
 @MAP_DEFAULTS
@@ -171,8 +172,8 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @click.option("-q", "--quiet", is_flag=True, help="No progress, no summary.")
 @click.pass_context
 def match(ctx: click.Context, scenario: str | None, dataset: str | None, *, program: str | None, format_: str | None,
-          output: Path | None, export: tuple[str, Path] | None, near: int | None, deadline: float | None,
-          report: Path | None, shard: Shard | None, resume: bool, sensors: Path | None, engine: Engine | None,
+          output: AnyPath | None, export: tuple[str, AnyPath] | None, near: int | None, deadline: float | None,
+          report: AnyPath | None, shard: Shard | None, resume: bool, sensors: Path | None, engine: Executor | None,
           explain: bool, advised: bool, where: str | None, sort: str | None, rank: bool, sample: int | None,
           diverse: bool, exit_zero: bool, summary: bool, quiet: bool, **given: Any) -> None:
     # fmt: on
@@ -182,7 +183,7 @@ def match(ctx: click.Context, scenario: str | None, dataset: str | None, *, prog
     object of every role and with values of the random variables that prove it.
     """
     started = time.perf_counter()
-    file = None if output is None or str(output) == "-" else output
+    file = chosen_file(output)
     chosen = choose_format(format_, None if shard else file)
     if shard is not None:
         given["jobs"] = given["jobs"] or 1  # whoever runs shards runs several
@@ -227,11 +228,11 @@ def match(ctx: click.Context, scenario: str | None, dataset: str | None, *, prog
     again = "the same command goes on from here" if resume else "`--resume` keeps what is done until it stops"
     INTERRUPTS.advice = f"  = hint: {again if file is not None else f'with `-o FILE`, {again}'}"
     if resume and file is not None:
-        real = Path(os.path.realpath(file))
+        real = Path(os.path.realpath(file)) if isinstance(file, Path) else file
         pieces = real.with_name(f".{real.name}.pieces")
-        engine = kept(engine or run_here, pieces)
+        engine = resumed(pieces, engine or on_this_machine(query))
     bar = ProgressBar(query.dataset.manifest.total.frames, quiet=quiet)
-    results = in_order(query, engine, shards_of(query, 16), bar.advance) if engine else query.results(bar.advance)
+    results = in_order(query, engine, usual_pieces(query, 16), bar.advance) if engine else query.results(bar.advance)
     wanted = Wanted(file, chosen, export, report, pieces, sensors, ranked=rank)
     if selection is not None:
         results = _filtered(query, results, selection)
@@ -244,12 +245,12 @@ def match(ctx: click.Context, scenario: str | None, dataset: str | None, *, prog
         try:
             said = deliver(query, results, _noted(_near(query, near), came_close), wanted, bar)
         except BaseException:
-            if pieces is not None:
+            if isinstance(pieces, Path):
                 with contextlib.suppress(OSError):
                     pieces.rmdir()  # if nothing is done yet
             raise
         if pieces is not None and not query.funnel.cut:
-            shutil.rmtree(pieces, ignore_errors=True)
+            remove_folder(pieces)
     INTERRUPTS.advice = "  = hint: all results are written"
     if query.funnel.cut:
         _tell_cut(query, resume=resume)

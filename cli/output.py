@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO, NoReturn, Self
 
 from scenicq.errors import DataError, Diagnostic
-from scenicq.store.atomic_files import WholeFile
+from scenicq.store.atomic_files import WholeFile, check_writable, whole_file
+from scenicq.store.remote_path import AnyPath, RemotePath
 
 from .streams import results
 
@@ -23,7 +24,7 @@ __all__ = ["ProgressBar", "choose_format", "destination", "writing"]
 _EXTENSIONS = {".jsonl": "jsonl", ".csv": "csv", ".parquet": "parquet", ".txt": "ids"}
 
 
-def choose_format(name: str | None, file: Path | None) -> str:
+def choose_format(name: str | None, file: AnyPath | None) -> str:
     """The format that is asked for, else that of the file's extension, else what suits a terminal or a pipe.
 
     Raises:
@@ -44,7 +45,7 @@ def choose_format(name: str | None, file: Path | None) -> str:
 
 
 @contextlib.contextmanager
-def writing(file: Path | None) -> Generator[None]:
+def writing(file: AnyPath | None) -> Generator[None]:
     """Makes what the operating system says while results are written a message about their target.
 
     Raises:
@@ -60,8 +61,8 @@ def writing(file: Path | None) -> Generator[None]:
 
 
 @contextlib.contextmanager
-def destination(file: Path | None, folder: Path | None = None) -> Generator[BinaryIO]:
-    """Standard output, or a file that is written elsewhere and renamed at the end.
+def destination(file: AnyPath | None, folder: AnyPath | None = None) -> Generator[BinaryIO]:
+    """Standard output, or a file that gets its name at the end.
 
     Args:
         file: The file; standard output if None.
@@ -72,13 +73,17 @@ def destination(file: Path | None, folder: Path | None = None) -> Generator[Bina
     """
     if file is None:
         yield results().buffer
+    elif isinstance(file, RemotePath):
+        check_writable(file)
+        with whole_file(file) as sink:
+            yield sink
     elif file.exists() and not file.is_file() and not file.is_dir():
         with writing(file):
             device = file.open("wb")
         with device:
             yield device
     else:
-        yield from _complete(file, Path(os.path.realpath(file)), folder)
+        yield from _complete(file, Path(os.path.realpath(file)), folder if isinstance(folder, Path) else None)
 
 
 def _complete(name: Path, file: Path, folder: Path | None) -> Generator[BinaryIO]:

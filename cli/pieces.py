@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 
 import click
 
 from scenicq.errors import DataError, Diagnostic
-from scenicq.query.execution.partitions import gather, is_done, partitions, write_partition
+from scenicq.query.execution.pieces import finished, gather, partitions, write_piece
 from scenicq.query.execution.question_notes import name_question, note_question
 from scenicq.query.execution.records import Record, record
 from scenicq.query.execution.result_origin import name_origin
 from scenicq.query.execution.result_summary import ResultSummary
 from scenicq.query.execution.results import Funnel
 from scenicq.query.execution.run import Query
+from scenicq.store.atomic_files import check_writable
+from scenicq.store.remote_path import AnyPath
 
 from .output import ProgressBar
 
@@ -38,7 +39,7 @@ def parse_shard(_ctx: click.Context, _parameter: click.Parameter, text: str | No
     return int(left), int(right)
 
 
-def _whole(query: Query, shard: Shard, folder: Path, bar: ProgressBar) -> Iterator[Record]:
+def _whole(query: Query, shard: Shard, folder: AnyPath, bar: ProgressBar) -> Iterator[Record]:
     """The records of a shard, all of them; what is asked is written once they are there, not by a run that is stopped.
 
     Raises:
@@ -55,7 +56,7 @@ def _whole(query: Query, shard: Shard, folder: Path, bar: ProgressBar) -> Iterat
     note_question(folder, query)
 
 
-def run_shard(query: Query, shard: Shard, folder: Path, *, quiet: bool) -> tuple[Funnel, ResultSummary | None]:
+def run_shard(query: Query, shard: Shard, folder: AnyPath, *, quiet: bool) -> tuple[Funnel, ResultSummary | None]:
     """Match one shard into a folder, unless it is there already; what it found is counted, and says of itself."""
     number, count = shard
     question = name_question(query)
@@ -63,9 +64,10 @@ def run_shard(query: Query, shard: Shard, folder: Path, *, quiet: bool) -> tuple
     if number > len(pieces):
         return Funnel(), None  # fewer recordings than shards: nothing is left for this one
     piece = pieces[number - 1]
-    if not is_done(folder, question, piece.number, piece.count):
+    if not finished(folder, question, [piece]):
+        check_writable(folder)
         query.recordings = piece.recordings
         with ProgressBar(piece.frames, quiet=quiet) as bar:
-            write_partition(folder, question, piece, _whole(query, shard, folder, bar), query)
+            write_piece(folder, question, piece, _whole(query, shard, folder, bar), query)
     gathered = gather(folder, question, only=piece.number)
     return gathered.funnel, gathered.summary

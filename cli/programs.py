@@ -11,8 +11,10 @@ import click
 from scenicq.errors import DataError, Diagnostic, Source
 from scenicq.query.execution.option_texts import DRIVING
 from scenicq.query.execution.program_files import read_program
+from scenicq.store.remote_path import local_path
 
 from .options import option_type
+from .path_type import check_here
 
 __all__ = ["LANES", "MAP_DEFAULTS", "PROGRAM_TEXT", "SCENARIO", "given_program", "read_scenario"]
 
@@ -44,14 +46,15 @@ LANES = click.option(
 """The option for the lanes of an object; see `compile_scenario`."""
 
 
-def read_scenario(path: Path) -> Source:
+def read_scenario(path: str | Path) -> Source:
     """The program of a file, or of standard input for `-`.
 
     Raises:
-        DataError: file-missing; file-invalid where it is not UTF-8 text.
+        DataError: file-missing; file-invalid where it is not UTF-8 text; option-invalid where it lies elsewhere.
     """
     if str(path) != "-":
-        return read_program(path)
+        check_here(path)
+        return read_program(local_path(str(path)))
     data: bytes = sys.stdin.buffer.read()
     try:
         return Source("<stdin>", data.decode("utf-8-sig"))
@@ -86,4 +89,4 @@ def given_program(
             raise click.UsageError(f"Missing argument '{name}'.", ctx)
     if text is not None:
         return Source("<program>", text), [*there[1:]], DRIVING
-    return read_scenario(Path(str(there[0]))), [*there[1:]], None
+    return read_scenario(str(there[0])), [*there[1:]], None

@@ -13,11 +13,13 @@ from scenicq.exporters.sample import PATIENCE_S, sample_labels, sample_record, w
 from scenicq.option_values import SEED, Count
 from scenicq.query.execution.option_texts import read_built_ins
 from scenicq.query.execution.program_files import SiblingFiles
+from scenicq.store.remote_path import AnyPath
 
 from .check import networks_of, read_version
 from .manual import Manual
 from .option_type import OptionType
 from .options import option_type
+from .path_type import ANY_PATH, LOCAL_PATH
 from .programs import LANES, MAP_DEFAULTS, PROGRAM_TEXT, SCENARIO, given_program
 from .streams import say
 
@@ -37,7 +39,7 @@ __all__ = ["sample"]
 @click.argument("scenario", metavar="SCENARIO", type=click.Path(), required=False)
 @click.argument("dataset", metavar="[DATASET]", type=click.Path(), required=False)
 @PROGRAM_TEXT
-@click.option("--map", "map_file", metavar="FILE", type=click.Path(path_type=Path), help="A GeoJSON or OpenDRIVE map.")
+@click.option("--map", "map_file", metavar="FILE", type=LOCAL_PATH, help="A GeoJSON or OpenDRIVE map.")
 @click.option("-n", "--number", metavar="N", type=OptionType(Count()), default=1, help="Scenes to draw.")
 @click.option("--seed", metavar="N", type=OptionType(SEED), default=0, help="The same seed gives the same scenes.")
 @click.option(
@@ -57,13 +59,13 @@ __all__ = ["sample"]
 @MAP_DEFAULTS
 @LANES
 @click.option("--initial", is_flag=True, help="Ignore behaviors and other dynamic parts.")
-@click.option("-o", "--output", metavar="DIR", type=click.Path(path_type=Path),
-              help="Write an interchange folder with labels and map, to be ingested.")  # fmt: skip
+@click.option("-o", "--output", metavar="DIR", type=ANY_PATH,
+              help="Write an interchange folder with labels and map, to be ingested, here or elsewhere.")  # fmt: skip
 @click.pass_context
 def sample(ctx: click.Context, scenario: str | None, dataset: str | None, *, program: str | None,
            map_file: Path | None, number: int, seed: int,
            waive: str, timeout: float, scenic: str | None, map_defaults: bool, lanes: LaneRule, initial: bool,
-           output: Path | None) -> None:  # fmt: skip
+           output: AnyPath | None) -> None:  # fmt: skip
     """Draw scenes from a scenario, as labels.
 
     They have the distribution of the program, given that all requirements hold, those that Scenic adds included. On

@@ -23,6 +23,7 @@ from scenicq.report.png import can_make_png, png
 from scenicq.report.sensors import SensorFiles, can_make_thumbnails, roots_of
 from scenicq.store.dataset import Dataset
 from scenicq.store.labels import Label
+from scenicq.store.remote_path import AnyPath
 
 from .datasets import open_checked
 from .manual import Manual
@@ -30,6 +31,7 @@ from .match import match
 from .option_type import OptionType
 from .options import ONE_FRAME, OVER_TIME, SHARED, query_options
 from .output import destination, writing
+from .path_type import ANY_PATH, LOCAL_PATH, chosen_file
 from .programs import read_scenario
 from .remarks import remarks, show_remarks
 from .sources import SENSORS, sensor_root
@@ -41,7 +43,7 @@ _STYLES: dict[str, Style] = {".svg": "adaptive", ".png": "light", ".html": "none
 """The formats, with the style that a picture needs for each."""
 
 
-def _kind(output: Path | None) -> str:
+def _kind(output: AnyPath | None) -> str:
     """What to write, by the name of the file: SVG on standard output."""
     kind = ".svg" if output is None else output.suffix.lower()
     if kind not in _STYLES:
@@ -86,7 +88,7 @@ def _shot(dataset: Dataset, label: Label, scenario: Path | None, given: dict[str
 @click.option(
     "--scenario",
     metavar="FILE",
-    type=click.Path(path_type=Path),
+    type=LOCAL_PATH,
     help="Show what this scenario says of the frame: roles, where each may be and which way it may face, hidden "
     "points, and in red what excludes it. Over time the roles are those of the interval in which the frame lies.",
 )
@@ -94,8 +96,8 @@ def _shot(dataset: Dataset, label: Label, scenario: Path | None, given: dict[str
     "-o",
     "--output",
     metavar="FILE",
-    type=click.Path(path_type=Path),
-    help="Where to: .svg, .png (needs scenicq[png]) or .html.  [default: SVG to standard output]",
+    type=ANY_PATH,
+    help="Where to, here or elsewhere: .svg, .png (needs scenicq[png]) or .html.  [default: SVG to standard output]",
 )
 @click.option(
     "--half",
@@ -105,13 +107,13 @@ def _shot(dataset: Dataset, label: Label, scenario: Path | None, given: dict[str
 )
 @click.option("--width", metavar="PX", type=OptionType(WIDTH), default=900, help="Width in pixels.")
 @SENSORS
-def show(dataset: str, frame: str, *, scenario: Path | None, output: Path | None, half: float | None,
+def show(dataset: str, frame: str, *, scenario: Path | None, output: AnyPath | None, half: float | None,
          width: int, sensors: Path | None, **given: Any) -> None:  # fmt: skip
     """Draw one frame from above: map, boxes, and what a scenario says of it.
 
     The picture is drawn to scale with north up; the ego is in its middle.
     """
-    file = None if output is None or str(output) == "-" else output
+    file = chosen_file(output)
     kind = _kind(file)
     opened = open_checked(dataset)
     shot, backdrop = _shot(opened, named_frame(opened, frame), scenario, given)
@@ -120,9 +122,10 @@ def show(dataset: str, frame: str, *, scenario: Path | None, output: Path | None
         case ".png":
             data = png(picture)
         case ".html":
-            beside = Path() if file is None else file.absolute().parent
+            beside = file.absolute().parent if isinstance(file, Path) else file or Path()
             roots = roots_of(opened, sensor_root(opened, sensors))
-            files = SensorFiles(roots, beside, beside, can_make_thumbnails(), inside=True)
+            work = beside if isinstance(beside, Path) else Path()  # one frame has all its images in the page
+            files = SensorFiles(roots, beside, work, can_make_thumbnails(), inside=True)
             data = frame_page(shot, picture, files.find(shot.label.sensors)).encode()
         case _:
             data = picture.encode()

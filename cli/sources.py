@@ -19,6 +19,7 @@ from scenicq.store.manifest import MANIFEST, Manifest, read_manifest
 from scenicq.store.place import Place, find_place
 from scenicq.store.sound_notes import SoundNotes
 
+from .path_type import LocalPathType
 from .report import show
 from .user_folders import state_folder
 
@@ -30,7 +31,7 @@ __all__ = ["SENSORS", "is_noted_sound", "note_sound", "recorded", "remember", "s
 SENSORS = click.option(
     "--sensors",
     metavar="DIR",
-    type=click.Path(path_type=Path, exists=True, file_okay=False),
+    type=LocalPathType(path_type=Path, exists=True, file_okay=False),
     help="The folder that the paths of sensor files start from.  [default: the source, if you ingested it here]",
 )
 """The option by which a user says so."""

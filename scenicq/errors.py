@@ -72,7 +72,7 @@ CODES: dict[str, str] = {
     "map-invalid": "an element of a map is not sound",
     "store-missing": "the folder is not a dataset of ours",
     "store-version": "the dataset was written by another version",
-    "store-unreachable": "where the dataset lies does not answer, or not to whoever asks",
+    "store-unreachable": "where a dataset or results lie does not answer, or not to whoever asks",
     "store-damaged": "a file of the dataset is missing or changed",
     "dataset-invalid": "a table of the dataset holds what no dataset may",
     "sql-invalid": "a question in SQL that the database refuses",

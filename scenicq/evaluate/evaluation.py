@@ -39,13 +39,14 @@ from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query
 from scenicq.query.execution.skipped_frames import summarize
 from scenicq.store.dataset import Dataset
+from scenicq.store.remote_path import AnyPath, RemotePath, any_path
 
 __all__ = ["Evaluation", "ScenarioEvaluation", "WorstFrame", "evaluate"]
 
 Bools = NDArray[np.bool_]
 Reals = NDArray[np.float64]
 
-Results: TypeAlias = Query | Path | str | Iterable[Result | Record | Mapping[str, Any]]
+Results: TypeAlias = Query | AnyPath | str | Iterable[Result | Record | Mapping[str, Any]]
 """A query, of which every correspondence is found; a file of results; results as a query gives them; or records of
 them, which may be plain values."""
 
@@ -230,12 +231,12 @@ def evaluate(
 def _name_of(results: Results) -> str:
     if isinstance(results, Query):
         return Path(results.source.name.strip("<>")).stem
-    return Path(results).stem if isinstance(results, Path | str) else "results"
+    return any_path(results).stem if isinstance(results, Path | RemotePath | str) else "results"
 
 
 def _doubt(name: str, results: Results, said: Completeness) -> Iterator[Diagnostic]:
     """A warning where results do not say of every frame whether it matches."""
-    if said.summary is None and not isinstance(results, Path | str):
+    if said.summary is None and not isinstance(results, Path | RemotePath | str):
         return  # who hands them over knows
     told = "other frames count as those that do not match"
     if said.summary is not None:
@@ -254,8 +255,8 @@ def _records(results: Results, doubts: list[Diagnostic]) -> Iterator[Record | Su
         doubts += query.funnel.warnings
         yield SummaryRecord(summarize(query, counted))
         return
-    if isinstance(results, Path | str):
-        yield from read_records(Path(results)).records
+    if isinstance(results, Path | RemotePath | str):
+        yield from read_records(any_path(results)).records
         return
     for number, each in enumerate(results, 1):
         if isinstance(each, Result):

@@ -25,6 +25,7 @@ from scenicq.report.svg import Plane, element, escape, points_path
 from scenicq.report.write import new_report
 from scenicq.store.dataset import Dataset
 from scenicq.store.labels import Label
+from scenicq.store.remote_path import AnyPath
 
 __all__ = ["SHOWN", "write_pages"]
 
@@ -46,7 +47,7 @@ _SIGNS = (
 )
 
 
-def write_pages(evaluation: Evaluation, dataset: Dataset, folder: Path, sensors: Path | None = None) -> Path:
+def write_pages(evaluation: Evaluation, dataset: Dataset, folder: AnyPath, sensors: Path | None = None) -> AnyPath:
     """Write a page into a folder; an earlier report there is replaced when the new one is complete.
 
     Args:

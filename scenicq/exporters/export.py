@@ -1,6 +1,6 @@
 """Hands the matching frames back in the form that the next tool reads.
 
-Every export is a folder that appears when it is complete.
+Every export is a folder that appears when it is complete; elsewhere its last file does.
 """
 
 # pyarrow has no type stubs.
@@ -9,7 +9,6 @@ Every export is a folder that appears when it is complete.
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
@@ -27,8 +26,9 @@ from scenicq.match.verdict import Match, Unknown
 from scenicq.query.execution.interval_frames import frames_of
 from scenicq.query.execution.result_summary import ResultSummary
 from scenicq.query.execution.results import Result
-from scenicq.store.atomic_files import whole_folder
+from scenicq.store.atomic_files import check_writable, is_taken, whole_folder
 from scenicq.store.dataset import Dataset
+from scenicq.store.remote_path import AnyPath
 
 __all__ = ["EXPORTS", "ExportSummary", "Exporter"]
 
@@ -44,7 +44,7 @@ class ExportSummary:
         left_out: Warnings about what the form cannot hold, such as objects without a heading.
     """
 
-    target: Path
+    target: AnyPath
     files: tuple[str, ...]
     frames: int
     left_out: tuple[Diagnostic, ...]
@@ -57,16 +57,17 @@ class Exporter:
     Attributes:
         kind: One of `EXPORTS`.
         dataset: Where the frames are from.
-        target: Folder that is not there yet.
+        target: Folder that is not there yet, here or elsewhere.
         scenario: Name of the scenario.
 
     Raises:
-        DataError: `option-invalid` for a form that does not exist or does not suit the dataset; `target-exists`.
+        DataError: `option-invalid` for a form that does not exist or does not suit the dataset; `target-exists`;
+            `target-unwritable` for a place elsewhere.
     """
 
     kind: str
     dataset: Dataset
-    target: Path
+    target: AnyPath
     scenario: str = ""
     _matched: dict[str, MatchedFrame] = field(default_factory=dict[str, MatchedFrame], init=False, repr=False)
     _further: int = field(default=0, init=False, repr=False)
@@ -81,11 +82,12 @@ class Exporter:
             message = f"an export `{self.kind}` needs a dataset from {wanted}, this one is from {importer}"
             hint = "`interchange`, `openlabel` and `paths` suit every dataset"
             raise DataError(Diagnostic("option-invalid", message, hints=(hint,)))
-        if os.path.lexists(self.target):
+        if is_taken(self.target):
             hint = "choose another name: an export never replaces anything"
             raise DataError(Diagnostic("target-exists", f"{self.target} exists", hints=(hint,)))
         if not self.target.name or self.target.name == "..":
             raise DataError(Diagnostic("target-unwritable", f"{self.target} is not the name of a new folder"))
+        check_writable(self.target)
 
     def add(self, result: Result) -> None:
         """Take a result; those that are no match are passed over, of several of one frame the first counts.

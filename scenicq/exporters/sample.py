@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import random
 from collections.abc import Iterable, Iterator, Set
-from pathlib import Path
 
 from scenicq.budget import Exhausted, limited
 from scenicq.errors import DataError, Diagnostic, Note, ScenarioError
@@ -16,9 +15,10 @@ from scenicq.forest.nodes import Value
 from scenicq.forest.scenario import BuiltIn, Scenario
 from scenicq.geometry.angles import normalize
 from scenicq.geometry.network import Network
-from scenicq.store.atomic_files import whole_folder
+from scenicq.store.atomic_files import check_writable, whole_folder
 from scenicq.store.classes import ROOT, is_class
 from scenicq.store.labels import Label, LabelObject
+from scenicq.store.remote_path import AnyPath
 
 __all__ = ["PATIENCE_S", "sample_labels", "sample_record", "write_sample"]
 
@@ -142,15 +142,22 @@ def sample_record(label: Label) -> str:
     return json.dumps(label_record(label, list(label.objects)), ensure_ascii=False)
 
 
-def write_sample(labels: Iterable[Label], network: Network, name: str, folder: Path) -> None:
+def write_sample(labels: Iterable[Label], network: Network, name: str, folder: AnyPath) -> None:
     """Write labels and their map as an interchange folder.
+
+    Args:
+        labels: Drawn once it is clear that the folder can be written.
+        network: The map.
+        name: Of the dataset.
+        folder: Here or elsewhere; nothing may be there.
 
     Raises:
         DataError: target-exists, target-unwritable.
     """
-    lines = [sample_record(label) for label in labels]
+    check_writable(folder)
     try:
         with whole_folder(folder) as work:
+            lines = [sample_record(label) for label in labels]
             (work / "labels.jsonl").write_text("\n".join([*lines, ""]), encoding="utf-8")
             write_map(work / "maps" / f"{network.name}.geojson", network.features)
             header = {"name": name, "interchange": 1, "angle": "heading", "classes": "scenic"}

@@ -11,6 +11,7 @@ from scenicq.evaluate.evaluation import Evaluation
 from scenicq.evaluate.pages import write_pages
 from scenicq.evaluate.rows import tables
 from scenicq.store.dataset import Dataset
+from scenicq.store.remote_path import AnyPath, any_path
 
 __all__ = ["Judgement"]
 
@@ -37,11 +38,11 @@ class Judgement:
                 found.append(each.simulated.sentence)
         return tuple(found)
 
-    def report(self, folder: str | Path, *, sensors: str | Path | None = None) -> Path:
+    def report(self, folder: str | Path, *, sensors: str | Path | None = None) -> AnyPath:
         """Write pages with the worst frames first, as `scenicq evaluate --report`.
 
         Args:
-            folder: New, empty, or with an older report.
+            folder: New, empty, or with an older report; or a new one elsewhere, as `s3://bucket/report`.
             sensors: The folder that the paths of sensor files start from.
 
         Returns:
@@ -50,7 +51,7 @@ class Judgement:
         Raises:
             DataError: target-exists, or target-unwritable.
         """
-        return write_pages(self.evaluation, self.dataset, Path(folder), None if sensors is None else Path(sensors))
+        return write_pages(self.evaluation, self.dataset, any_path(folder), None if sensors is None else Path(sensors))
 
     def __repr__(self) -> str:
         """The sentences."""

@@ -41,6 +41,7 @@ from scenicq.report.backdrop import Backdrop
 from scenicq.report.picture import LETTERS, Shot, draw
 from scenicq.report.write import write_report
 from scenicq.store.labels import Label
+from scenicq.store.remote_path import AnyPath, any_path
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -325,11 +326,11 @@ class Matches(Sequence[FrameResult]):
         """
         return take_picture(*self._shot(frame), half, width)
 
-    def report(self, folder: str | Path, *, sensors: str | Path | None = None) -> Path:
+    def report(self, folder: str | Path, *, sensors: str | Path | None = None) -> AnyPath:
         """Write a page with pictures of the results.
 
         Args:
-            folder: New, empty, or with an older report.
+            folder: New, empty, or with an older report; or a new one elsewhere, as `s3://bucket/report`.
             sensors: The folder that the paths of sensor files start from.
 
         Returns:
@@ -339,7 +340,7 @@ class Matches(Sequence[FrameResult]):
             DataError: target-exists, or target-unwritable.
         """
         results = [each.result for each in self._all()]
-        return write_report(self.query, results, Path(folder), sensors=None if sensors is None else Path(sensors))
+        return write_report(self.query, results, any_path(folder), sensors=None if sensors is None else Path(sensors))
 
     def evaluate(
         self,

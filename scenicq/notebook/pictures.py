@@ -14,6 +14,7 @@ from scenicq.report.backdrop import Backdrop
 from scenicq.report.picture import Shot, draw
 from scenicq.report.png import png
 from scenicq.store.atomic_files import whole_file
+from scenicq.store.remote_path import any_path
 
 __all__ = ["SCROLLS", "DisplayedText", "Picture", "take_picture"]
 
@@ -37,12 +38,13 @@ class Picture:
         """Write the picture into a file, completely or not at all.
 
         Args:
-            path: Whose name ends in `.svg`, or in `.png`, which needs `scenicq[png]`.
+            path: Here or elsewhere, as `s3://bucket/x.svg`; its name ends in `.svg`, or in `.png`, which needs
+                `scenicq[png]`.
 
         Raises:
             DataError: option-invalid: another ending, or nothing here makes PNG; target-unwritable.
         """
-        target = Path(path)
+        target = any_path(path)
         if target.suffix.lower() not in (".svg", ".png"):
             hints = ("known are .svg and .png",)
             raise DataError(Diagnostic("option-invalid", f"the name {target} does not say which format", hints=hints))

@@ -16,6 +16,7 @@ from typing import Any
 from urllib.parse import quote
 
 from scenicq.store.dataset import Dataset
+from scenicq.store.remote_path import AnyPath, RemotePath
 
 __all__ = ["Sensor", "SensorFiles", "can_make_thumbnails", "roots_of"]
 
@@ -75,7 +76,7 @@ class SensorFiles:
     """
 
     roots: tuple[Path, ...]
-    report: Path
+    report: AnyPath
     folder: Path
     thumbnails: bool = False
     inside: bool = False
@@ -102,6 +103,8 @@ class SensorFiles:
         return found
 
     def _link(self, file: Path) -> str:
+        if isinstance(self.report, RemotePath):
+            return file.as_uri()
         try:
             relative = Path(os.path.relpath(file, self.report.resolve()))
         except ValueError:

@@ -31,6 +31,8 @@ from scenicq.report.shares import program_lines
 from scenicq.report.sheet import sheet_section, timelines_section, to_picture
 from scenicq.report.svg import element, escape
 from scenicq.report.timelines import interval_runs
+from scenicq.store.atomic_files import check_writable, whole_folder
+from scenicq.store.remote_path import AnyPath, RemotePath
 
 __all__ = ["INLINE", "MOST", "check_target", "new_report", "write_report"]
 
@@ -45,12 +47,18 @@ _WORK = ".report-"
 _OWN = ("pictures", "thumbnails", "index.html")
 
 
-def check_target(folder: Path) -> None:
+def check_target(folder: AnyPath) -> None:
     """Make sure that a report may be written to a folder: one that is new, empty, or has an older report of ours.
+
+    Elsewhere it must be new: nothing there is replaced in one step but a file.
 
     Raises:
         DataError: target-exists, or target-unwritable.
     """
+    if isinstance(folder, RemotePath):
+        _check_new(folder)
+        check_writable(folder)
+        return
     try:
         if not folder.exists() or (folder.is_dir() and not any(folder.iterdir())):
             return
@@ -69,6 +77,12 @@ def check_target(folder: Path) -> None:
     raise DataError(Diagnostic("target-exists", f"{folder} is there and is no report", hints=(hint,)))
 
 
+def _check_new(folder: RemotePath) -> None:
+    if folder.exists():
+        hint = "choose a new folder: a report elsewhere is never replaced"
+        raise DataError(Diagnostic("target-exists", f"{folder} is there already", hints=(hint,)))
+
+
 def _unwritable(folder: Path, error: OSError) -> DataError:
     return DataError(Diagnostic("target-unwritable", f"{folder} cannot be written: {error.strerror or error}"))
 
@@ -76,13 +90,13 @@ def _unwritable(folder: Path, error: OSError) -> DataError:
 def write_report(
     query: Query,
     results: Sequence[Result],
-    folder: Path,
+    folder: AnyPath,
     *,
     near: Sequence[Result] = (),
     command: str = "",
     elapsed_s: float = 0.0,
     sensors: Path | None = None,
-) -> Path:
+) -> AnyPath:
     """Write a report into a folder; an earlier report there is replaced when the new one is complete.
 
     Args:
@@ -107,7 +121,7 @@ def write_report(
 
 
 @contextlib.contextmanager
-def new_report(folder: Path) -> Generator[Path]:
+def new_report(folder: AnyPath) -> Generator[Path]:
     """A folder to make a report in, which takes the place of an earlier one when it is complete.
 
     Args:
@@ -119,6 +133,11 @@ def new_report(folder: Path) -> Generator[Path]:
     Raises:
         DataError: target-exists, or target-unwritable.
     """
+    if isinstance(folder, RemotePath):
+        _check_new(folder)
+        with whole_folder(folder) as work:
+            yield work
+        return
     check_target(folder)
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -176,7 +195,7 @@ class _World:
 class _Report:
     """What the parts of one report share."""
 
-    def __init__(self, query: Query, folder: Path, work: Path, sensors: Path | None) -> None:
+    def __init__(self, query: Query, folder: AnyPath, work: Path, sensors: Path | None) -> None:
         self.query, self.work = query, work
         self.worlds: dict[str, _World | None] = {}
         self.files = SensorFiles(roots_of(query.dataset, sensors), folder, work, can_make_thumbnails())

@@ -1,11 +1,18 @@
-"""Files that are there completely or not at all: written under another name, synced, then renamed."""
+"""Files and folders that are there completely or not at all, here or elsewhere (`RemotePath`).
+
+Here they are written under another name, synced, then renamed. Elsewhere they are written in a folder of this machine
+and then sent: a file appears at once, and the last file of a folder when all others are there.
+"""
 
 from __future__ import annotations
 
 import errno
 import os
+import shutil
+import tempfile
 from collections.abc import Generator
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import BinaryIO
 
@@ -15,17 +22,27 @@ except ImportError:
     fcntl = None
 
 from scenicq.errors import DataError, Diagnostic
+from scenicq.store.remote_path import AnyPath, RemotePath
 
 __all__ = [
+    "COMPLETE",
     "Spare",
     "WholeFile",
+    "check_writable",
+    "is_taken",
     "made_folder",
+    "remove_folder",
     "sole_writer",
     "sync_folder",
     "whole_file",
     "whole_folder",
     "write_whole",
 ]
+
+COMPLETE = "_SUCCESS"
+"""The empty file that comes last into a folder elsewhere, as jobs of Hadoop and Spark leave it."""
+_STAGE = "scenicq-"
+"""How the temporary folders begin in which lies what is to be sent."""
 
 
 class WholeFile:
@@ -35,15 +52,17 @@ class WholeFile:
     is the same as a `with` statement; this is for those who tell errors of the file from those of who writes it.
     """
 
-    def __init__(self, path: Path, folder: Path | None = None) -> None:
+    def __init__(self, path: AnyPath, folder: AnyPath | None = None) -> None:
         """Choose the names; nothing is written yet.
 
         Args:
             path: The file.
-            folder: Where it is written, on the same file system; beside its place by default.
+            folder: Where a file of this machine is written, on the same file system; beside its place by default.
         """
         self._path = path
-        self._temporary = (folder or path.parent) / f".{path.name}.{os.getpid()}.tmp"
+        self._stage: Path | None = None
+        beside = folder if isinstance(folder, Path) else path.parent if isinstance(path, Path) else Path()
+        self._temporary = beside / f".{path.name}.{os.getpid()}.tmp"
         self._file: BinaryIO | None = None
         self._begun = False
 
@@ -55,6 +74,9 @@ class WholeFile:
         """
         # an interrupt may come when the file is there and has not been handed on
         self._begun = True
+        if isinstance(self._path, RemotePath):
+            self._stage = Path(tempfile.mkdtemp(prefix=_STAGE))
+            self._temporary = self._stage / self._path.name
         self._file = self._temporary.open("wb")
         return self._file
 
@@ -63,13 +85,21 @@ class WholeFile:
 
         Raises:
             OSError: What was written does not reach the disk.
+            DataError: target-unwritable: it cannot be sent; it stays on this machine, and is named.
         """
         assert self._file is not None
         self._file.flush()
         os.fsync(self._file.fileno())
         self._file.close()
-        self._temporary.replace(self._path)
-        sync_folder(self._path.parent)
+        if isinstance(self._path, RemotePath):
+            try:
+                self._path.put(self._temporary)
+            except DataError as error:
+                self._stage = None
+                raise _staying(error, self._temporary) from error
+        else:
+            self._temporary.replace(self._path)
+            sync_folder(self._path.parent)
 
     def abandon(self) -> None:
         """Remove what is not finished; nothing where all is."""
@@ -78,16 +108,28 @@ class WholeFile:
         if self._file is not None:
             with suppress(OSError):  # what is left in the buffer may not fit on the disk
                 self._file.close()
+        if isinstance(self._path, RemotePath):
+            if self._stage is not None:
+                shutil.rmtree(self._stage, ignore_errors=True)
+            return
         with suppress(OSError):
             self._temporary.unlink()
 
 
+def _staying(error: DataError, stage: Path) -> DataError:
+    """The error, with where on this machine lies what could not be sent."""
+    (told,) = error.diagnostics
+    hint = f"what was to be written lies in {stage}, and can be copied there"
+    return DataError(replace(told, hints=(*told.hints, hint)))
+
+
 @contextmanager
-def whole_file(path: Path) -> Generator[BinaryIO]:
+def whole_file(path: AnyPath) -> Generator[BinaryIO]:
     """A file to be written, which gets its name at the end of the block unless that fails.
 
     Raises:
         OSError: It cannot be written.
+        DataError: target-unwritable: it cannot be sent.
     """
     whole = WholeFile(path)
     try:
@@ -97,23 +139,47 @@ def whole_file(path: Path) -> Generator[BinaryIO]:
         whole.abandon()
 
 
-def write_whole(path: Path, text: str) -> None:
+def write_whole(path: AnyPath, text: str) -> None:
     """Write a text file in UTF-8, completely or not at all.
 
     Raises:
-        OSError: It cannot be written.
+        OSError, DataError: It cannot be written; as of `whole_file`.
     """
     with whole_file(path) as file:
         file.write(text.encode())
 
 
+def is_taken(path: AnyPath) -> bool:
+    """Whether anything has the name, a link that leads nowhere included.
+
+    Raises:
+        DataError: store-unreachable.
+    """
+    return path.exists() if isinstance(path, RemotePath) else os.path.lexists(path)
+
+
+def check_writable(path: AnyPath) -> None:
+    """Find out, before the work, whether a place elsewhere can be written; here, whoever opens a file is told.
+
+    Raises:
+        DataError: target-unwritable.
+    """
+    if isinstance(path, RemotePath):
+        path.check_writable()
+
+
 @contextmanager
-def made_folder(folder: Path) -> Generator[None]:
+def made_folder(folder: AnyPath) -> Generator[None]:
     """A folder, made if need be; if the block fails, one that was made and that nothing is in goes again.
+
+    Elsewhere there are no folders but by what is in them.
 
     Raises:
         OSError: It cannot be made.
     """
+    if isinstance(folder, RemotePath):
+        yield
+        return
     made = not folder.exists()
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -126,14 +192,24 @@ def made_folder(folder: Path) -> Generator[None]:
 
 
 @contextmanager
-def whole_folder(path: Path) -> Generator[Path]:
+def whole_folder(path: AnyPath, last: str = COMPLETE) -> Generator[Path]:
     """A folder to be written, which gets its name at the end of the block unless that fails.
+
+    Args:
+        path: Where it shall be; nothing may be there.
+        last: Name of the file that is sent last where the folder is elsewhere; one that is not there is made, empty.
 
     Raises:
         OSError: It cannot be written; FileExistsError where something has the name.
-        DataError: target-busy: another process writes it.
+        DataError: target-busy: another process writes it; target-unwritable: it cannot be sent.
     """
-    if os.path.lexists(path):
+    if isinstance(path, RemotePath):
+        if is_taken(path):
+            raise FileExistsError
+        with _sent_folder(path, last) as folder:
+            yield folder
+        return
+    if is_taken(path):
         raise FileExistsError
     beside = path.with_name(f".{path.name}.tmp")
     if beside.is_symlink():
@@ -155,6 +231,45 @@ def whole_folder(path: Path) -> Generator[Path]:
                 words = f"the system's encoding of names of files, {error.encoding}, has none for {error.object!a}"
                 raise OSError(errno.EILSEQ, words) from error
             raise
+
+
+@contextmanager
+def _sent_folder(path: RemotePath, last: str) -> Generator[Path]:
+    """A folder of this machine, which is sent at the end of the block unless that fails."""
+    stage = Path(tempfile.mkdtemp(prefix=_STAGE))
+    keep = False
+    try:
+        folder = stage / path.name
+        folder.mkdir()
+        yield folder
+        names = sorted(each.relative_to(folder) for each in folder.rglob("*") if each.is_file())
+        if Path(last) in names:
+            names.remove(Path(last))
+        else:
+            (folder / last).touch()
+        sent: list[RemotePath] = []
+        try:
+            for name in (*names, Path(last)):
+                sent.append(path / name)
+                sent[-1].put(folder / name)
+        except BaseException as error:
+            for each in reversed(sent):
+                each.remove()
+            if isinstance(error, DataError):
+                keep = True
+                raise _staying(error, folder) from error
+            raise
+    finally:
+        if not keep:
+            shutil.rmtree(stage, ignore_errors=True)
+
+
+def remove_folder(folder: AnyPath) -> None:
+    """Remove a folder with all in it, as far as that may be."""
+    if isinstance(folder, RemotePath):
+        folder.remove_folder()
+    else:
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def _empty(folder: Path) -> None:
@@ -205,14 +320,18 @@ def _locked(handle: int) -> bool:
 
 
 @contextmanager
-def sole_writer(folder: Path) -> Generator[None]:
+def sole_writer(folder: AnyPath) -> Generator[None]:
     """Hold a folder for writing, made if need be, so that a second run is told before it works.
 
     The lock goes with the process, however that ends. A folder that was made and that nothing is in is removed again.
+    Elsewhere there are no locks.
 
     Raises:
         DataError: target-busy: another process holds it; target-unwritable.
     """
+    if isinstance(folder, RemotePath):
+        yield
+        return
     made = not folder.exists()
     try:
         with made_folder(folder):

@@ -10,6 +10,7 @@ one step. Files that the new manifest does not name go when nobody reads the dat
 from __future__ import annotations
 
 import os
+import re
 import shutil
 from collections.abc import Sequence
 from contextlib import suppress
@@ -29,6 +30,8 @@ except ImportError:  # not POSIX: two ingests into one target are then the user'
 __all__ = ["Partial", "check_target"]
 
 _LOCK = "lock"
+_SCHEME = re.compile("[A-Za-z][A-Za-z0-9+.-]+:")
+"""How an address begins that was taken for a path; one letter is a drive."""
 
 
 class Partial:
@@ -195,6 +198,10 @@ def check_target(target: Path, *, force: bool = False, update: bool = False) -> 
         DataError: `target-exists`; `target-unwritable` for a path without a name of its own, one that is no text, or
             one of whose folders is a link.
     """
+    if _SCHEME.fullmatch(target.parts[0] if target.parts else ""):
+        message = f"{target} begins as an address does, and is no folder of this machine"
+        hint = "`scenicq ingest SOURCE s3://...` writes a dataset elsewhere"
+        raise DataError(Diagnostic("target-unwritable", message, hints=(hint,)))
     if not target.name or target.name == "..":
         raise DataError(Diagnostic("target-unwritable", f"{target} is not the name of a new folder"))
     check_path(target, "target-unwritable")

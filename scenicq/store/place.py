@@ -11,7 +11,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, Protocol, Self
-from urllib.parse import unquote
 
 import pyarrow.parquet as pq
 
@@ -19,6 +18,7 @@ from scenicq.errors import DataError, Diagnostic
 from scenicq.store.manifest import MANIFEST, Manifest, Part, check_path, find_links
 from scenicq.store.read_lock import Reading
 from scenicq.store.remote import RemoteFile, RemoteFolder
+from scenicq.store.remote_path import is_address, local_path
 
 if TYPE_CHECKING:  # an ingest needs no DuckDB, which is slow to load
     import duckdb
@@ -183,12 +183,9 @@ def find_place(address: str | Path) -> Place:
         DataError: option-invalid: what the address needs is not installed.
     """
     text = str(address)
-    if isinstance(address, Path) or "://" not in text:
-        return LocalFolder.at(Path(address))
-    if text.startswith("file://"):
-        # all of it is the path: a question mark begins no query
-        return LocalFolder.at(Path(unquote(text.removeprefix("file://").removeprefix("localhost"))))
-    return RemoteFolder.at(text)
+    if isinstance(address, Path):
+        return LocalFolder.at(address)
+    return RemoteFolder.at(text) if is_address(text) else LocalFolder.at(local_path(text))
 
 
 def stamp_of(place: Place, manifest: Manifest) -> str:

@@ -27,7 +27,7 @@ from scenicq.store.manifest import MANIFEST, Part
 if TYPE_CHECKING:  # an ingest needs no DuckDB, which is slow to load
     import duckdb
 
-__all__ = ["RemoteFile", "RemoteFolder"]
+__all__ = ["RemoteFile", "RemoteFolder", "ask", "file_system", "why_not"]
 
 _TAIL = 1 << 17
 """Bytes at the end of a file that are fetched when it is first opened, and kept: enough for almost any footer."""
@@ -36,6 +36,8 @@ _TAILS = 512
 _BLOCK = 1 << 24
 _PATIENCE_S = 60
 """Seconds that a request may take, with all that is tried again."""
+_SLOWEST = 1_000_000
+"""Bytes a second below which a transfer counts as one that does not answer."""
 _SCHEME = "scenicq"
 """The scheme of addresses in SQL, whatever the real ones are."""
 _INSTALL = {
@@ -90,19 +92,7 @@ class RemoteFolder:
         Raises:
             DataError: option-invalid: the package for the protocol is not installed, or there is no such protocol.
         """
-        protocol = address.partition("://")[0]
-        if find_spec("fsspec") is None:
-            message = f"{address} needs the package fsspec, which is not installed"
-            raise DataError(Diagnostic("option-invalid", message, hints=(_INSTALL["s3"],)))
-        from fsspec.core import url_to_fs  # noqa: PLC0415 - optional
-
-        try:
-            files, root = url_to_fs(address)
-        except (ImportError, ValueError) as error:
-            hints = (_INSTALL[protocol],) if protocol in _INSTALL else ()
-            message = f"{address} cannot be read: {_line(error)}"
-            raise DataError(Diagnostic("option-invalid", message, hints=hints)) from error
-        return cls(address, files, root.rstrip("/"))
+        return cls(address, *file_system(address))
 
     @property
     def address(self) -> str:
@@ -193,12 +183,7 @@ class RemoteFolder:
         Raises:
             TimeoutError: After `_PATIENCE_S`.
         """
-        path = f"{self.root}/{path}"
-        if not getattr(self.files, "async_impl", False):
-            return getattr(self.files, method)(path, **options)
-        from fsspec.asyn import sync  # noqa: PLC0415 - optional
-
-        return sync(self.files.loop, getattr(self.files, f"_{method}"), path, timeout=_PATIENCE_S, **options)
+        return ask(self.files, method, f"{self.root}/{path}", **options)
 
     def tail(self, part: Part) -> bytes:
         """The end of a file."""
@@ -214,19 +199,72 @@ class RemoteFolder:
         return data
 
 
+def file_system(address: str) -> tuple[Any, str]:
+    """The file system of fsspec that an address is in, and the place there.
+
+    Raises:
+        DataError: option-invalid: the package for the protocol is not installed, or there is no such protocol.
+    """
+    protocol = address.partition("://")[0]
+    if find_spec("fsspec") is None:
+        message = f"{address} needs the package fsspec, which is not installed"
+        raise DataError(Diagnostic("option-invalid", message, hints=(_INSTALL["s3"],)))
+    from fsspec.core import url_to_fs  # noqa: PLC0415 - optional
+
+    try:
+        files, root = url_to_fs(address)
+    except (ImportError, ValueError) as error:
+        hints = (_INSTALL[protocol],) if protocol in _INSTALL else ()
+        message = f"{address} cannot be reached: {_line(error)}"
+        raise DataError(Diagnostic("option-invalid", message, hints=hints)) from error
+    return files, root.rstrip("/")
+
+
+def ask(files: Any, method: str, *given: Any, size: int = 0, **options: Any) -> Any:
+    """Call a method of a file system of fsspec; where nothing answers, whatever it would try again ends, too.
+
+    Args:
+        files: The file system.
+        method: Its name.
+        given: Positional arguments.
+        size: Bytes that are to be sent or fetched.
+        options: Arguments by name.
+
+    Raises:
+        TimeoutError: After `_PATIENCE_S` seconds, and what so many bytes take.
+        Exception: Whatever the protocol raises.
+    """
+    if not getattr(files, "async_impl", False):
+        return getattr(files, method)(*given, **options)
+    from fsspec.asyn import sync  # noqa: PLC0415 - optional
+
+    patience_s = _PATIENCE_S + size / _SLOWEST
+    return sync(files.loop, getattr(files, f"_{method}"), *given, timeout=patience_s, **options)
+
+
 def _line(error: Exception) -> str:
     return " ".join(str(error).split()) or type(error).__name__
 
 
-def _unreachable(what: str, error: Exception) -> DataError:
+def why_not(what: str, error: Exception) -> tuple[str, tuple[str, ...]]:
+    """A message, and hints: what cannot be done, and why.
+
+    Args:
+        what: Such as `s3://bucket/town cannot be read`.
+        error: What the protocol has raised.
+    """
     line = f"nothing answers within {_PATIENCE_S} s" if isinstance(error, TimeoutError) else _line(error)
     named = f"{type(error).__name__} {line}".lower()
     # S3 calls a request bad whose token has expired, where the answer has no text
     refused = isinstance(error, PermissionError) or any(
         each in named for each in ("credential", "token", "bad request")
     )
-    message = f"{what} cannot be read with these credentials: {line}" if refused else f"{what} cannot be read: {line}"
-    return DataError(Diagnostic("store-unreachable", message, hints=_CREDENTIALS if refused else ()))
+    return (f"{what} with these credentials: {line}", _CREDENTIALS) if refused else (f"{what}: {line}", ())
+
+
+def _unreachable(what: str, error: Exception) -> DataError:
+    message, hints = why_not(f"{what} cannot be read", error)
+    return DataError(Diagnostic("store-unreachable", message, hints=hints))
 
 
 _CREDENTIALS = (

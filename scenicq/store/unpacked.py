@@ -36,7 +36,7 @@ _DICTIONARY_BATCH, _RECORD_BATCH = 2, 3
 class Bound:
     """Counts what a file has unpacked to, and refuses it where that is too much."""
 
-    def __init__(self, file: Path, size: int | None = None) -> None:
+    def __init__(self, file: str | Path, size: int | None = None) -> None:
         """Begin to count.
 
         Args:
@@ -47,7 +47,7 @@ class Bound:
             OSError: The file is not there.
         """
         self._file = file
-        self._most = max(_LEAST, _MOST_TIMES * (file.stat().st_size if size is None else size))
+        self._most = max(_LEAST, _MOST_TIMES * (Path(file).stat().st_size if size is None else size))
         self._bytes = 0
 
     def add(self, size: int) -> None:

@@ -157,7 +157,7 @@ UNREACHED = {
     "advice_maps": "of datasets with several maps",
     "brief_maps": "of datasets with several maps",
     "block_tries": "of processes that die (`tests/query/execution/test_block_executor.py`)",
-    "piece_retries": "of a cluster whose disks fail (`tests/query/execution/test_shards.py`)",
+    "piece_retries": "of a cluster whose disks fail (`tests/query/execution/test_executors.py`)",
 }
 """Limits that no input reaches, and why."""
 FAST = {

@@ -8,11 +8,12 @@ import msgspec
 from msgspec import Struct
 
 from scenicq.errors import DataError, Diagnostic, Source
-from scenicq.query.execution.partitions import fingerprint
+from scenicq.query.execution.pieces import fingerprint
 from scenicq.query.execution.program_files import SiblingFiles, program_text
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.atomic_files import made_folder, write_whole
 from scenicq.store.dataset import open_dataset
+from scenicq.store.remote_path import AnyPath
 
 __all__ = ["name_question", "note_question", "noted_question"]
 
@@ -33,7 +34,7 @@ def name_question(query: Query) -> str:
     return fingerprint(query.dataset, text, query.options)
 
 
-def note_question(folder: Path, query: Query) -> None:
+def note_question(folder: AnyPath, query: Query) -> None:
     """Write beside the pieces of a query what it asks.
 
     Raises:
@@ -55,7 +56,7 @@ def note_question(folder: Path, query: Query) -> None:
         raise DataError(Diagnostic("target-unwritable", f"{file} cannot be written: {error.strerror}")) from None
 
 
-def noted_question(folder: Path, question: str) -> Query:
+def noted_question(folder: AnyPath, question: str) -> Query:
     """The query whose pieces are in a folder.
 
     Args:
@@ -81,5 +82,5 @@ def noted_question(folder: Path, question: str) -> Query:
     return query
 
 
-def _file(folder: Path, question: str) -> Path:
+def _file(folder: AnyPath, question: str) -> AnyPath:
     return folder / f"{question}.json"

@@ -10,7 +10,6 @@ import csv
 import io
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any, TypeVar
 
 import msgspec
@@ -24,6 +23,7 @@ from scenicq.query.execution.recorded_columns import is_cell, read_cells
 from scenicq.query.execution.records import DENSITY, Record, SummaryRecord, decode_record, record_of
 from scenicq.query.execution.result_summary import Completeness, ResultSummary, join_summaries
 from scenicq.query.execution.result_tables import METADATA, read_row, read_summary
+from scenicq.store.remote_path import AnyPath
 from scenicq.store.unpacked import RECORD_BYTES, Bound, check_claims, decoded_bytes, text_columns
 
 __all__ = ["ReadResults", "RecordStream", "read_records", "read_results"]
@@ -51,7 +51,7 @@ class ReadResults:
     completeness: Completeness
 
 
-def read_results(path: Path) -> ReadResults:
+def read_results(path: AnyPath) -> ReadResults:
     """The results in a file by name; of several of one frame the first match counts.
 
     Raises:
@@ -66,7 +66,7 @@ def read_results(path: Path) -> ReadResults:
     return ReadResults(found, records.completeness)
 
 
-def read_records(path: Path) -> RecordStream:
+def read_records(path: AnyPath) -> RecordStream:
     """All results in a file with all that they say: of frames, or of intervals of recordings.
 
     Raises:
@@ -102,7 +102,7 @@ class RecordStream:
                 yield each if each.summary is UNSET else structs.replace(each, summary=UNSET)
 
 
-def _records(path: Path, columns: tuple[str, ...] | None) -> Iterator[Record | SummaryRecord]:
+def _records(path: AnyPath, columns: tuple[str, ...] | None) -> Iterator[Record | SummaryRecord]:
     """What a file holds.
 
     Args:
@@ -122,32 +122,32 @@ def _records(path: Path, columns: tuple[str, ...] | None) -> Iterator[Record | S
             return _of_lines(path, _text(path, data))
 
 
-def _invalid(path: Path, why: str) -> DataError:
+def _invalid(path: AnyPath, why: str) -> DataError:
     hint = "`scenicq match ... -o FILE` writes such a file: .jsonl, .csv or .parquet"
     return DataError(Diagnostic("file-invalid", f"{path} holds no results: {why}", hints=(hint,)))
 
 
-def _text(path: Path, data: bytes) -> str:
+def _text(path: AnyPath, data: bytes) -> str:
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError:
         raise _invalid(path, "it is not text in UTF-8") from None
 
 
-def _read(path: Path, where: str, read: Callable[[], _T]) -> _T:
+def _read(path: AnyPath, where: str, read: Callable[[], _T]) -> _T:
     try:
         return read()
     except (msgspec.DecodeError, RecursionError) as error:
         raise _invalid(path, f"{where} is no result: {error}") from None
 
 
-def _of_lines(path: Path, text: str) -> Iterator[Record | SummaryRecord]:
+def _of_lines(path: AnyPath, text: str) -> Iterator[Record | SummaryRecord]:
     for number, line in enumerate(text.split("\n"), 1):
         if line.strip():
             yield _read(path, f"line {number}", lambda line=line: decode_record(line))
 
 
-def _of_csv(path: Path, text: str) -> Iterator[Record | SummaryRecord]:
+def _of_csv(path: AnyPath, text: str) -> Iterator[Record | SummaryRecord]:
     limit = csv.field_size_limit(_LONGEST)
     try:
         rows = csv.DictReader(io.StringIO(text, newline=""), strict=True)
@@ -176,9 +176,9 @@ def _values(row: Mapping[str, Any]) -> dict[str, Any]:
     return {"summary": found["summary"]} if not found.get("verdict") and "summary" in found else found
 
 
-def _of_parquet(path: Path, data: bytes, columns: tuple[str, ...] | None) -> Iterator[Record | SummaryRecord]:
+def _of_parquet(path: AnyPath, data: bytes, columns: tuple[str, ...] | None) -> Iterator[Record | SummaryRecord]:
     try:
-        bound = Bound(path, len(data))
+        bound = Bound(str(path), len(data))
         with pq.ParquetFile(pa.BufferReader(data)) as parquet:
             chosen = None if columns is None else [name for name in columns if name in parquet.schema_arrow.names]
             check_claims(parquet, bound, chosen)

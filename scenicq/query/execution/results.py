@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Generator, Mapping
+from contextlib import closing
 from dataclasses import dataclass, field
 from typing import Any
 
 from scenicq.errors import Diagnostic
 from scenicq.match.verdict import Match, NoMatch, Unknown, Verdict
 
-__all__ = ["Chosen", "Funnel", "IntervalSpan", "LogDensity", "Recorded", "RecordedCell", "Result", "Sample"]
+__all__ = ["Chosen", "Funnel", "IntervalSpan", "LogDensity", "Recorded", "RecordedCell", "Result", "Sample", "up_to"]
 
 RecordedCell = float | bool | str | tuple[float, float] | None
 """A recorded value: a number, a truth value, a text, a vector; None where there is none."""
@@ -230,3 +231,22 @@ class Funnel:
                 self.reasons[verdict.reason] += 1
             case NoMatch():
                 failed[verdict.cause.what] += 1
+
+
+def up_to(limit: int | None, found: Generator[Result], funnel: Funnel) -> Generator[Result]:
+    """Results until so many matches are there; then whoever gives them is closed.
+
+    Args:
+        limit: How many; None for all.
+        found: The results.
+        funnel: Takes the match at which they ended.
+    """
+    left = limit
+    with closing(found):
+        for result in found:
+            yield result
+            if left is not None and isinstance(result.verdict, Match):
+                left -= 1
+                if left <= 0:
+                    funnel.limited = result
+                    return

@@ -21,7 +21,7 @@ from scenicq.forest.scenario import Scenario
 from scenicq.geometry.network import Network
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.preprocess import ready
-from scenicq.match.verdict import Cause, Match, NoMatch
+from scenicq.match.verdict import Cause, NoMatch
 from scenicq.query.execution.block_executor import BlockExecutor
 from scenicq.query.execution.block_matcher import CompiledMap, Decided, Decider
 from scenicq.query.execution.compiled_map import (
@@ -36,7 +36,7 @@ from scenicq.query.execution.merged_blocks import merge_frames, merge_intervals,
 from scenicq.query.execution.never_compared import Coverage, coverage
 from scenicq.query.execution.program_files import SiblingFiles
 from scenicq.query.execution.recorded_columns import RecordedColumn, columns_of
-from scenicq.query.execution.results import Funnel, Result
+from scenicq.query.execution.results import Funnel, Result, up_to
 from scenicq.query.prefilter.executor import Block, Extent, blocks, extents, names, whole_recordings
 from scenicq.query.prefilter.plan import Plan
 from scenicq.store.dataset import Dataset, DatasetReference
@@ -389,9 +389,12 @@ class Query:
         Raises:
             ScenarioError: The program is wrong or not supported.
         """
+        return up_to(self.options.limit, self._all_results(progress), self.funnel)
+
+    def _all_results(self, progress: Callable[[int], None] | None) -> Generator[Result]:
         compiled = self._compiled_maps()
         self._warn(compiled)
-        left, ahead = self.options.limit, FramesAhead(progress)
+        ahead = FramesAhead(progress)
         with ExitStack() as stack:
             stack.enter_context(self.dataset.blamed())
             setup = (self.dataset.reference, self.source, self.options, self.siblings)
@@ -414,11 +417,6 @@ class Query:
                     for result in merged:
                         self.funnel.count_recorded(result)
                         yield result
-                        if left is not None and isinstance(result.verdict, Match):
-                            left -= 1
-                            if left <= 0:
-                                self.funnel.limited = result
-                                return
                 if self.funnel.cut:
                     return
 

@@ -14,11 +14,10 @@ import pytest
 
 from scenicq import budget
 from scenicq.match.options import MatchOptions
-from scenicq.query.execution.partitions import fingerprint
+from scenicq.query.execution.pieces import fingerprint
 from scenicq.query.execution.program_files import read_program
 from scenicq.query.execution.records import record
 from scenicq.query.execution.run import Query, QueryOptions
-from scenicq.query.execution.shards import in_order, kept, run_here, shards_of
 from scenicq.store.dataset import Dataset, open_dataset
 
 PROGRAM = Path(__file__).parents[3] / "sample_data" / "scenarios" / "01_pedestrian_facing_ego.scenic"
@@ -77,19 +76,6 @@ def test_nothing_is_begun_when_the_time_is_over(dataset: Dataset, jobs: int) -> 
     assert records(late) == []
     assert late.funnel.cut
     assert late.funnel.frames == 0
-
-
-def test_whole_pieces_are_kept_and_a_later_run_does_the_others(dataset: Dataset, clock: Clock, tmp_path: Path) -> None:
-    every = records(query(dataset, until=math.inf))
-    first = query(dataset, until=clock.now * 1.5)
-    some = [record(each) for each in in_order(first, kept(run_here, tmp_path), shards_of(first, 16), lambda _: None)]
-    pieces = len(list(tmp_path.iterdir()))
-    second = query(dataset)
-    rest = [record(each) for each in in_order(second, kept(run_here, tmp_path), shards_of(second, 16), lambda _: None)]
-    assert 0 < pieces < len(shards_of(second, 16))
-    assert some == every[: len(some)]
-    assert rest == every
-    assert (first.funnel.cut, second.funnel.cut) == (True, False)
 
 
 def test_a_deadline_does_not_make_another_question(dataset: Dataset) -> None:

@@ -16,11 +16,11 @@ import pytest
 from scenicq.errors import DataError
 from scenicq.importers.ingest import ingest
 from scenicq.match.options import MatchOptions
+from scenicq.query.execution.executors import Executor, in_order, on_this_machine, usual_pieces
 from scenicq.query.execution.program_files import read_program
 from scenicq.query.execution.records import record
 from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query, QueryOptions
-from scenicq.query.execution.shards import Engine, in_order, run_here, shards_of
 from scenicq.store.dataset import open_dataset
 from scenicq.store.separate_check import check_apart
 
@@ -55,15 +55,15 @@ def by_blocks(query: Query) -> Iterator[Result]:
 
 
 def by_shards(query: Query) -> Iterator[Result]:
-    return in_order(query, run_here, shards_of(query, 3), lambda _: None)
+    return in_order(query, on_this_machine(query), usual_pieces(query, 3), lambda _: None)
 
 
 def by_dask(query: Query) -> Iterator[Result]:
     pytest.importorskip("distributed")
-    from scenicq.query.execution.dask_engine import dask_engine
+    from scenicq.query.execution.dask_executor import dask
 
-    engine: Engine = dask_engine()
-    return in_order(query, engine, shards_of(query, 3), lambda _: None)
+    engine: Executor = dask()
+    return in_order(query, engine, usual_pieces(query, 3), lambda _: None)
 
 
 @pytest.fixture
@@ -89,7 +89,7 @@ def test_processes_read_the_dataset_that_was_asked_about_or_none(
     dataset, other = two
     query = Query(open_dataset(dataset), read_program(PROGRAM), OPTIONS)
     if way is not by_blocks:
-        shards_of(query)
+        usual_pieces(query)
     query.is_over_time()
     results = way(query)
     replacement(dataset, other)

@@ -25,12 +25,12 @@ import scenicq
 from scenicq import budget
 from scenicq.errors import Source
 from scenicq.importers.ingest import ingest
+from scenicq.query.execution.executors import here, in_order, resumed, usual_pieces
 from scenicq.query.execution.option_texts import DRIVING, read_options
 from scenicq.query.execution.records import record
 from scenicq.query.execution.result_files import read_results
 from scenicq.query.execution.result_summary import Completeness, ResultCount, ResultSummary
 from scenicq.query.execution.run import Query
-from scenicq.query.execution.shards import in_order, kept, run_here, shards_of
 from scenicq.query.execution.skipped_frames import summarize
 from scenicq.store.dataset import Dataset, open_dataset
 
@@ -100,7 +100,7 @@ def test_what_a_deadline_skips_is_what_all_does_not_name(
     def run(until: float) -> tuple[set[str], ResultSummary]:
         options = replace(read_options(every=True, prefilter=False, model=DRIVING), until=until)
         query = Query(town, Source("p", program), options)
-        results = in_order(query, run_here, shards_of(query, 9), lambda _: None) if engine else query.results()
+        results = in_order(query, here, usual_pieces(query, 9), lambda _: None) if engine else query.results()
         found, summary = taken(query, results)
         return {each.recording if each.interval else each.frame for each in found}, summary
 
@@ -288,11 +288,11 @@ def test_pieces_say_what_the_whole_says(run: Any, crossroads: Path, tmp_path: Pa
 
 def test_pieces_of_a_limited_query_are_cut_where_one_is(town: Dataset, tmp_path: Path) -> None:
     """They lie beside `-o FILE --resume`; each has its own end."""
-    from scenicq.query.execution.partitions import gather
+    from scenicq.query.execution.pieces import gather
 
     query = Query(town, Source("p", PLAIN), read_options(limit=20, every=True, model=DRIVING))
-    pieces = shards_of(query, 2)
-    engine = kept(run_here, tmp_path)
+    pieces = usual_pieces(query, 2)
+    engine = resumed(tmp_path, here)
     for _ in engine(query, pieces, lambda _: None):
         pass
     gathered = gather(tmp_path)

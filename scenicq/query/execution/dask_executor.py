@@ -32,12 +32,12 @@ from scenicq.budget import time_left_s
 from scenicq.errors import DataError, Diagnostic
 from scenicq.limits import LIMITS
 from scenicq.processes import processors
-from scenicq.query.execution.partitions import Partition
+from scenicq.query.execution.executors import Done, Executor, Progress, Question, alone, run_piece
+from scenicq.query.execution.pieces import DatasetPiece
 from scenicq.query.execution.run import Query
-from scenicq.query.execution.shards import Done, Engine, Progress, Question, alone, run_shard
 from scenicq.store.read_lock import Reading, nobody_reads
 
-__all__ = ["dask_engine"]
+__all__ = ["dask"]
 
 _LOOPBACK = "127.0.0.1"
 _SCRATCH = "scenicq-dask-"
@@ -50,8 +50,8 @@ _LOOK_S, _NOBODY_S = 2, 60
 _LATER = ("`--resume` with `-o FILE` goes on where a query stopped",)
 
 
-def dask_engine(address: str | None = None) -> Engine:
-    """An engine that runs pieces on Dask.
+def dask(address: str | None = None) -> Executor:
+    """An executor that runs pieces on Dask.
 
     Args:
         address: Of a scheduler, such as `tcp://host:8786`, whose workers have this version of scenicq and see the
@@ -66,11 +66,11 @@ def dask_engine(address: str | None = None) -> Engine:
         message = f"`--engine dask` needs the package {missing[0]}, which is not installed"
         raise DataError(Diagnostic("option-invalid", message, hints=("`pip install 'scenicq[dask]'` adds it",)))
 
-    def run(query: Query, pieces: Iterable[Partition], progress: Progress) -> Generator[tuple[Partition, Done]]:
+    def run(query: Query, pieces: Iterable[DatasetPiece], progress: Progress) -> Generator[tuple[DatasetPiece, Done]]:
         with _quiet(), _client(query, address) as client:
             for piece, done in _run(client, query, pieces):
-                yield piece, done
                 progress(piece.frames)
+                yield piece, done
 
     return run
 
@@ -148,13 +148,13 @@ def _scratch() -> Generator[str]:
             using.end()
 
 
-def _run(client: Any, query: Query, pieces: Iterable[Partition]) -> Iterator[tuple[Partition, Done]]:
+def _run(client: Any, query: Query, pieces: Iterable[DatasetPiece]) -> Iterator[tuple[DatasetPiece, Done]]:
     """Hand out a bounded number of pieces ahead, and take what they give in order."""
     from distributed import CancelledError, KilledWorker  # noqa: PLC0415
 
     question = Question.of(query)
     waiting = iter(pieces)
-    pending: deque[tuple[Partition, Any]] = deque()
+    pending: deque[tuple[DatasetPiece, Any]] = deque()
     try:
         while True:
             room = 3 * max(1, _workers(client)) - len(pending)
@@ -231,7 +231,7 @@ def _workers(client: Any) -> int:
 _known = threading.local()
 
 
-def _work(question: Question, piece: Partition, client_version: str, machine: str, left_s: float) -> Done:
+def _work(question: Question, piece: DatasetPiece, client_version: str, machine: str, left_s: float) -> Done:
     """Run a piece in a worker, which keeps what it has compiled."""
     if __version__ != client_version:
         message = f"a worker has version {__version__} of scenicq, the client {client_version}"
@@ -241,4 +241,4 @@ def _work(question: Question, piece: Partition, client_version: str, machine: st
         if math.isfinite(left_s) and machine != platform.node():
             query.options = replace(query.options, until=time.monotonic() + left_s)
         _known.query, _known.fingerprint = query, question.fingerprint
-    return run_shard(_known.query, piece)
+    return run_piece(_known.query, piece)

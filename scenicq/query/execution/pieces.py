@@ -1,6 +1,6 @@
-"""Running a query piece by piece: partitions, their files, and putting them together.
+"""Running a query piece by piece: the pieces of a dataset, their files, and putting them together.
 
-A partition is a run of recordings in the order of a query, so the pieces of a dataset are the same for everybody who
+A piece is a run of recordings in the order of a query, so the pieces of a dataset are the same for everybody who
 asks for the same number. Each finished piece is one file, written under a temporary name and renamed; whoever runs
 again does what is missing. Any launcher will do: a loop, xargs, an array of cluster jobs.
 """
@@ -15,7 +15,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from itertools import groupby, pairwise
 from operator import itemgetter
-from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -29,12 +28,13 @@ from scenicq.query.execution.run import Query, QueryOptions, RecordingRange
 from scenicq.query.execution.skipped_frames import summarize
 from scenicq.store.atomic_files import made_folder, whole_file
 from scenicq.store.dataset import Dataset
+from scenicq.store.remote_path import AnyPath
 
-__all__ = ["Gathered", "Partition", "fingerprint", "gather", "is_done", "partitions", "write_partition"]
+__all__ = ["DatasetPiece", "Gathered", "fingerprint", "finished", "gather", "partitions", "write_piece"]
 
 
 @dataclass(frozen=True, slots=True)
-class Partition:
+class DatasetPiece:
     """One piece of a dataset.
 
     Attributes:
@@ -53,7 +53,7 @@ class Partition:
         return sum(stretch.frames for stretch in self.recordings.values())
 
 
-def partitions(dataset: Dataset, count: int) -> tuple[Partition, ...]:
+def partitions(dataset: Dataset, count: int) -> tuple[DatasetPiece, ...]:
     """At most `count` pieces of about the same number of frames; fewer where the dataset has fewer recordings.
 
     One after the other they hold the frames in the order in which a query finds them: map by map.
@@ -69,7 +69,7 @@ def partitions(dataset: Dataset, count: int) -> tuple[Partition, ...]:
         if seen * count >= total * len(cuts) or number == len(runs):
             cuts.append(number)
     pieces = [runs[low:high] for low, high in pairwise(cuts) if high > low]
-    return tuple(Partition(number, len(pieces), _ranges(piece)) for number, piece in enumerate(pieces))
+    return tuple(DatasetPiece(number, len(pieces), _ranges(piece)) for number, piece in enumerate(pieces))
 
 
 def _ranges(runs: Sequence[tuple[str, str, int]]) -> dict[str, RecordingRange]:
@@ -95,20 +95,28 @@ def fingerprint(dataset: Dataset, program: str, options: QueryOptions) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
-def _file(folder: Path, question: str, number: int, count: int) -> Path:
-    return folder / f"{question}-{number:05}-of-{count:05}.jsonl"
+def _name(question: str, number: int, count: int) -> str:
+    return f"{question}-{number:05}-of-{count:05}.jsonl"
 
 
-def is_done(folder: Path, question: str, number: int, count: int) -> bool:
-    """Whether a piece is finished."""
-    return _file(folder, question, number, count).exists()
+def finished(folder: AnyPath, question: str, pieces: Iterable[DatasetPiece]) -> frozenset[int]:
+    """The numbers of the pieces that are finished."""
+    there = {path.name for path in _files(folder)}
+    return frozenset(each.number for each in pieces if _name(question, each.number, each.count) in there)
 
 
-def write_partition(folder: Path, question: str, piece: Partition, records: Iterable[Record], query: Query) -> Path:
+def _files(folder: AnyPath) -> list[AnyPath]:
+    """The files of finished pieces, by name; elsewhere all of them cost one request, or few."""
+    return sorted(folder.glob("*-of-*.jsonl"), key=lambda path: path.name)
+
+
+def write_piece(
+    folder: AnyPath, question: str, piece: DatasetPiece, records: Iterable[Record], query: Query
+) -> AnyPath:
     """Write a finished piece: one line a record, the funnel and the summary last.
 
     Args:
-        folder: Where the pieces are; made if need be.
+        folder: Where the pieces are, made if need be; here or elsewhere.
         question: Its `fingerprint`.
         piece: Which piece.
         records: Its results, in order.
@@ -117,7 +125,7 @@ def write_partition(folder: Path, question: str, piece: Partition, records: Iter
     Raises:
         DataError: target-unwritable.
     """
-    target = _file(folder, question, piece.number, piece.count)
+    target = folder / _name(question, piece.number, piece.count)
     try:
         with made_folder(folder), whole_file(target) as file:
             counted = ResultCount()
@@ -148,7 +156,7 @@ class Gathered:
     """
 
     question: str
-    files: tuple[Path, ...]
+    files: tuple[AnyPath, ...]
     funnel: Funnel
     summary: ResultSummary | None
 
@@ -172,7 +180,7 @@ class _Piece:
     summary: ResultSummary | None
 
 
-def _piece(path: Path) -> _Piece:
+def _piece(path: AnyPath) -> _Piece:
     """The results in a file, and what was counted."""
     try:
         *lines, last = path.read_bytes().splitlines() or [b""]
@@ -190,7 +198,7 @@ def _counted(value: int | dict[str, int]) -> Any:
     return Counter(value) if isinstance(value, dict) else value
 
 
-def gather(folder: Path, question: str | None = None, *, only: int | None = None) -> Gathered:
+def gather(folder: AnyPath, question: str | None = None, *, only: int | None = None) -> Gathered:
     """Put the pieces in a folder together.
 
     Args:
@@ -201,7 +209,7 @@ def gather(folder: Path, question: str | None = None, *, only: int | None = None
     Raises:
         DataError: file-missing, naming the pieces that are missing; file-invalid for pieces of several questions.
     """
-    found = sorted(folder.glob("*-of-*.jsonl")) if folder.is_dir() else []
+    found = _files(folder)
     questions = sorted({path.name.rsplit("-", 3)[0] for path in found})
     if question is None and len(questions) > 1:
         raise DataError(Diagnostic("file-invalid", f"{folder} holds pieces of {len(questions)} different questions",
@@ -213,7 +221,8 @@ def gather(folder: Path, question: str | None = None, *, only: int | None = None
                                    hints=("run `scenicq match ... --shard i/n -o` with this folder",)))  # fmt: skip
     counts = {int(path.stem.rsplit("-", 1)[1]) for path in found}
     count = max(counts)
-    missing = [str(n + 1) for n in range(count) if not is_done(folder, chosen, n, count)]
+    there = {path.name for path in found}
+    missing = [str(n + 1) for n in range(count) if _name(chosen, n, count) not in there]
     if only is None and (missing or len(counts) > 1):
         shown = ", ".join(missing[:10]) + (" ..." if len(missing) > 10 else "")
         raise DataError(Diagnostic("file-missing", f"{len(missing)} of {count} pieces are missing: {shown}",

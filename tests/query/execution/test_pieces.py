@@ -11,11 +11,11 @@ from scenicq.errors import DataError
 from scenicq.importers.ingest import ingest
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import EXACT, parse_tolerance
-from scenicq.query.execution.partitions import Partition, fingerprint, gather, is_done, partitions, write_partition
+from scenicq.query.execution.executors import here, resumed
+from scenicq.query.execution.pieces import DatasetPiece, fingerprint, finished, gather, partitions, write_piece
 from scenicq.query.execution.program_files import read_program
 from scenicq.query.execution.records import FrameRecord, record
 from scenicq.query.execution.run import Query, QueryOptions
-from scenicq.query.execution.shards import kept, run_here
 from scenicq.store.dataset import Dataset, open_dataset
 
 ROOT = Path(__file__).parents[3]
@@ -30,12 +30,12 @@ def dataset(tmp_path_factory) -> Dataset:
     return open_dataset(target)
 
 
-def run_shard(dataset: Dataset, folder: Path, piece: Partition, options: QueryOptions = OPTIONS) -> Path:
+def run_piece(dataset: Dataset, folder: Path, piece: DatasetPiece, options: QueryOptions = OPTIONS) -> Path:
     source = read_program(PROGRAM)
     query = Query(dataset, source, options, recordings=piece.recordings)
     question = fingerprint(dataset, source.text, options)
     records = (record(result) for result in query.results())
-    return write_partition(folder, question, piece, records, query)
+    return write_piece(folder, question, piece, records, query)
 
 
 def whole(dataset: Dataset) -> tuple[list[dict], Query]:
@@ -60,7 +60,7 @@ def test_pieces_put_together_are_the_whole(dataset, tmp_path, count):
     expected, query = whole(dataset)
     assert expected
     for piece in reversed(partitions(dataset, count)):
-        run_shard(dataset, tmp_path, piece)
+        run_piece(dataset, tmp_path, piece)
     found = gather(tmp_path)
     assert list(found.records()) == expected
     assert found.funnel == replace(query.funnel, warnings=[])
@@ -70,15 +70,15 @@ def test_pieces_put_together_are_the_whole(dataset, tmp_path, count):
 def test_a_missing_piece_is_named(dataset, tmp_path):
     pieces = partitions(dataset, 3)
     for piece in (pieces[0], pieces[2]):
-        run_shard(dataset, tmp_path, piece)
+        run_piece(dataset, tmp_path, piece)
     with pytest.raises(DataError, match="1 of 3 pieces are missing: 2"):
         gather(tmp_path)
     question = fingerprint(dataset, read_program(PROGRAM).text, OPTIONS)
-    assert [is_done(tmp_path, question, number, 3) for number in range(3)] == [True, False, True]
+    assert finished(tmp_path, question, pieces) == {0, 2}
 
 
 def test_a_truncated_piece_is_refused(dataset, tmp_path):
-    path = run_shard(dataset, tmp_path, partitions(dataset, 1)[0])
+    path = run_piece(dataset, tmp_path, partitions(dataset, 1)[0])
     lines = path.read_text().splitlines()
     path.write_text("\n".join(lines[:-1]))
     with pytest.raises(DataError, match="not a complete piece"):
@@ -87,8 +87,8 @@ def test_a_truncated_piece_is_refused(dataset, tmp_path):
 
 def test_pieces_of_two_questions_do_not_mix(dataset, tmp_path):
     (piece,) = partitions(dataset, 1)
-    run_shard(dataset, tmp_path, piece)
-    run_shard(dataset, tmp_path, piece, replace(OPTIONS, match=MatchOptions(tolerance=EXACT)))
+    run_piece(dataset, tmp_path, piece)
+    run_piece(dataset, tmp_path, piece, replace(OPTIONS, match=MatchOptions(tolerance=EXACT)))
     with pytest.raises(DataError, match="2 different questions"):
         gather(tmp_path)
     assert gather(tmp_path, fingerprint(dataset, read_program(PROGRAM).text, OPTIONS)).funnel.matches
@@ -110,7 +110,7 @@ def test_a_failed_piece_leaves_nothing_behind(dataset, tmp_path):
 
     query = Query(dataset, read_program(PROGRAM), OPTIONS)
     with pytest.raises(KeyboardInterrupt):
-        write_partition(tmp_path, "question", piece, broken(), query)
+        write_piece(tmp_path, "question", piece, broken(), query)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -125,7 +125,7 @@ def test_pieces_of_a_program_whose_imports_have_changed_are_made_anew(dataset, t
         helper.write_text(f"far = {far}\n")
         query = Query(dataset, read_program(program), OPTIONS)
         pieces = partitions(dataset, 2)
-        done = kept(run_here, tmp_path / "pieces")(query, pieces, lambda _: None)
+        done = resumed(tmp_path / "pieces", here)(query, pieces, lambda _: None)
         found[far] = {result.frame for _, (results, _) in done for result in results}
     assert not found[-10_000]
     assert len(found[10_000]) > 3

@@ -1,0 +1,66 @@
+"""Paths on the command line: of files of this machine, or of what may lie elsewhere (`s3://...`) as well."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from scenicq.errors import DataError, Diagnostic
+from scenicq.store.remote_path import AnyPath, any_path, is_address, local_path
+
+__all__ = ["ANY_PATH", "LOCAL_PATH", "AnyPathType", "LocalPathType", "check_here", "chosen_file"]
+
+
+class AnyPathType(click.Path):
+    """A file or folder that may lie elsewhere."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """What a text names.
+
+        Raises:
+            DataError: option-invalid.
+        """
+        if not isinstance(value, str):
+            return value
+        if value.startswith("memory://"):
+            message = f"{value}: what is written to the memory of this process is gone with it"
+            raise DataError(Diagnostic("option-invalid", message, hints=("name a file, or an address as s3://...",)))
+        return any_path(value)
+
+
+class LocalPathType(click.Path):
+    """A file or folder that is read or written on this machine only."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """What a text names.
+
+        Raises:
+            DataError: option-invalid, where that lies elsewhere.
+        """
+        if isinstance(value, str):
+            check_here(value)
+            value = local_path(value)
+        return super().convert(value, param, ctx)
+
+
+def check_here(path: str | Path) -> None:
+    """Refuse an address of something elsewhere.
+
+    Raises:
+        DataError: option-invalid.
+    """
+    if is_address(str(path)):
+        message = f"{path} lies elsewhere, and this is read and written on this machine only"
+        hints = ("copy it to a folder of this machine, and name that",)
+        raise DataError(Diagnostic("option-invalid", message, hints=hints))
+
+
+def chosen_file(output: AnyPath | None) -> AnyPath | None:
+    """The file that is asked for; None for standard output, which `-` is, too."""
+    return None if output is None or str(output) == "-" else output
+
+
+ANY_PATH = AnyPathType()
+LOCAL_PATH = LocalPathType(path_type=Path)
