@@ -372,9 +372,8 @@ if __name__ == "__main__":
 
 @needs_signals
 @pytest.mark.timeout(1800)
-@pytest.mark.parametrize(
-    ("jobs", "kills"), [(1, 2), *(pytest.param(jobs, 8, marks=pytest.mark.slow) for jobs in (1, 2))]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("jobs", "kills"), [(1, 2), (1, 8), (2, 8)])
 def test_a_resumed_run_that_is_killed(crossroads: Path, tmp_path: Path, run: Any, kills: int, jobs: int) -> None:
     given = ["match", PROGRAM, crossroads, "--tolerance", "heading=5deg,position=0.3", "--classes", "coarse", "--all"]
     given += ["--no-prefilter"]
