@@ -14,7 +14,7 @@ from msgspec import DecodeError
 
 from scenicq.importers.base import Options
 from scenicq.importers.fields import InvalidError, check_characters
-from scenicq.importers.label_rows import labels_of
+from label_rows import labels_of
 from scenicq.importers.nuscenes import NuScenes
 from scenicq.importers.nuscenes_boxes import Boxes, BoxReader, of_rows
 from scenicq.importers.nuscenes_rows import ANNOTATIONS
