@@ -23,11 +23,11 @@ from scenicq.importers.report import Report
 from scenicq.importers.specification import specification
 from scenicq.importers.typed_rows import (
     ABSENT,
+    FullText,
     Length,
     NoJsonError,
     RowError,
     RowType,
-    Text,
     Words,
     plain_values,
     whole,
@@ -57,8 +57,8 @@ class _Member(Struct, kw_only=True, gc=False, forbid_unknown_fields=True):
 
 
 class _Object(_Member, kw_only=True, rename={"category": "class"}):
-    id: Text
-    category: Text
+    id: FullText
+    category: FullText
 
 
 class _Ego(_Member, kw_only=True, rename={"category": "class"}):
@@ -69,12 +69,12 @@ class _Ego(_Member, kw_only=True, rename={"category": "class"}):
 class _Line(Struct, kw_only=True, forbid_unknown_fields=True):
     """A label: objects and what is free to have any names are looked at one by one."""
 
-    id: Text
+    id: FullText
     recording: str
     timestamp_us: int | float
     objects: list[Raw]
     ego: Raw = ABSENT
-    map: Text | None = None
+    map: FullText | None = None
     params: dict[str, Raw] | None = None
     sensors: dict[str, Raw] | None = None
 

@@ -9,7 +9,7 @@ from msgspec import DecodeError, Raw, Struct
 from msgspec.json import decode
 
 from scenicq.importers.specification import specification
-from scenicq.importers.typed_rows import ABSENT, Length, RowType, Text, Words
+from scenicq.importers.typed_rows import ABSENT, FullText, Length, RowType, Words
 
 __all__ = [
     "ANNOTATIONS",
@@ -38,13 +38,13 @@ __all__ = [
 class TableRow(Struct, kw_only=True, forbid_unknown_fields=True):
     """A row of any table."""
 
-    token: Text
+    token: FullText
 
 
 class LogRow(TableRow):
     """A row of `log`."""
 
-    location: Text
+    location: FullText
     logfile: Words | None = None
     date_captured: Words | None = None
 
@@ -52,15 +52,15 @@ class LogRow(TableRow):
 class SceneRow(TableRow):
     """A row of `scene`; a description that is no text says nothing."""
 
-    name: Text
-    log_token: Text
+    name: FullText
+    log_token: FullText
     description: Any = None
 
 
 class SampleRow(TableRow):
     """A row of `sample`; some datasets in this layout have shares of a microsecond."""
 
-    scene_token: Text
+    scene_token: FullText
     timestamp: int | float
     next: Raw = ABSENT
     prev: Raw = ABSENT
@@ -69,19 +69,19 @@ class SampleRow(TableRow):
 class CategoryRow(TableRow):
     """A row of `category` or of `attribute`."""
 
-    name: Text
+    name: FullText
 
 
 class VisibilityRow(TableRow):
     """A row of `visibility`."""
 
-    level: Text
+    level: FullText
 
 
 class InstanceRow(TableRow):
     """A row of `instance`."""
 
-    category_token: Text
+    category_token: FullText
     nbr_annotations: Raw = ABSENT
     first_annotation_token: Raw = ABSENT
     last_annotation_token: Raw = ABSENT
@@ -90,13 +90,13 @@ class InstanceRow(TableRow):
 class SensorRow(TableRow):
     """A row of `sensor`."""
 
-    channel: Text
+    channel: FullText
 
 
 class MountedSensorRow(TableRow):
     """A row of `calibrated_sensor`, without what says how a camera sees."""
 
-    sensor_token: Text
+    sensor_token: FullText
     translation: Raw = ABSENT
     rotation: Raw = ABSENT
     camera_intrinsic: Raw = ABSENT
@@ -114,8 +114,8 @@ class Annotation(TableRow, kw_only=True, gc=False):
         num_lidar_pts, num_radar_pts: How many points were measured on it.
     """
 
-    sample_token: Text
-    instance_token: Text
+    sample_token: FullText
+    instance_token: FullText
     translation: tuple[float, float, float]
     size: tuple[Length, Length, Length]
     rotation: tuple[float, float, float, float]

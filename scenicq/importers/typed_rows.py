@@ -17,10 +17,10 @@ from scenicq.importers.fields import LONGEST_TEXT, InvalidError, parse_json
 from scenicq.importers.report import Report
 from scenicq.importers.specification import Specification
 
-__all__ = ["ABSENT", "Length", "NoJsonError", "RowError", "RowType", "Text", "Words", "plain_values", "whole"]
+__all__ = ["ABSENT", "FullText", "Length", "NoJsonError", "RowError", "RowType", "Words", "plain_values", "whole"]
 
 T = TypeVar("T", bound=Struct)
-Text: TypeAlias = Annotated[str, Meta(min_length=1, max_length=LONGEST_TEXT)]
+FullText: TypeAlias = Annotated[str, Meta(min_length=1, max_length=LONGEST_TEXT)]
 """A text that is not empty."""
 Words: TypeAlias = Annotated[str, Meta(max_length=LONGEST_TEXT)]
 Length: TypeAlias = Annotated[float, Meta(gt=0)]
@@ -32,7 +32,7 @@ _NO_NUMBER = re.compile(rb'("(?:[^"\\]|\\.)*")|NaN|-?Infinity')
 _MARK = b"\xef\xbb\xbf"
 """What some programs begin a text with."""
 _FIELDS = Decoder(dict[str, Raw])
-_NAME = Decoder(Text)
+_NAME = Decoder(FullText)
 _VALUE = Decoder(bool | int | float | str | None)
 _WRONG = re.compile(r"Expected `(\w+)[^`]*`(?:, got `(\w+)`| of length (>=|<=)? ?(\d+)| (>|>=|<=) \S+)?")
 _KINDS = {
