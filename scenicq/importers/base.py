@@ -1,24 +1,28 @@
 """What an importer is, and what all importers share: options, classes, maps, checks of labels.
 
-An importer knows one dataset format. It yields plain labels in the conventions of `scenicq.store.labels`; everything
-else (columns computed from the map, files, checksums) is the store's. Read next: `interchange.py`.
+An importer knows one dataset format. It yields columns, or plain labels that become columns, in the conventions of
+`scenicq.store.labels`; everything else (columns computed from the map, files, checksums) is the store's. Read next:
+`interchange.py`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, cast
+
+import numpy as np
+from numpy.typing import NDArray
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.importers.fields import NO_MAP, InvalidError, parse_json
 from scenicq.importers.folders import read_bytes
 from scenicq.importers.report import Report
 from scenicq.store.classes import ROOT, is_class
-from scenicq.store.columns import RecordingColumns, columns_of, second_of_track
-from scenicq.store.labels import Label, LabelObject, Recording
-from scenicq.store.value_rules import find_problems
+from scenicq.store.columns import RecordingColumns, columns_of, taken
+from scenicq.store.labels import Label, Recording
+from scenicq.store.value_rules import Problems, find_problems
 
 if TYPE_CHECKING:
     from scenicq.geometry.features import MapFeature
@@ -35,8 +39,8 @@ __all__ = [
     "read_maps",
 ]
 
-_Facts = Sequence[str | None]
-"""What is wrong with each of some things; None where nothing is."""
+_OF_EGO, _TWICE = "is kept for the ego", "is used twice"
+"""What is wrong with the id of an object."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +79,7 @@ class Entry:
 class Reader(Protocol):
     """Reads some recordings, perhaps in another process: it must be possible to pickle it."""
 
-    def recordings(self, labels: Labels, report: Report) -> Iterator[Recording | RecordingColumns]:
+    def recordings(self, labels: Labels, report: Report) -> Iterator[RecordingColumns]:
         """The recordings in order of their names, each with at least one label.
 
         Args:
@@ -107,7 +111,7 @@ class OpenedSource:
     context: str = ""
     facts: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
-    def recordings(self, report: Report) -> Iterator[Recording | RecordingColumns]:
+    def recordings(self, report: Report) -> Iterator[RecordingColumns]:
         """All recordings, one after the other."""
         return self.reader([entry.name for entry in self.entries]).recordings(Labels(self.maps, report), report)
 
@@ -178,61 +182,56 @@ class Labels:
         self._taken = taken
         self._frames: set[str] = set()
 
-    def accept(self, recording: RecordingColumns) -> bool:
-        """Take a recording whose labels are sound in themselves, if no name is used twice and all is on a map.
-
-        Args:
-            recording: The recording.
-        """
-        name, map_name, frames = recording.name, recording.map, recording.frames
-        if find_problems(recording) or second_of_track(recording) is not None:
-            return False
-        unique = set(frames)
-        if len(unique) < len(frames) or unique & self._frames or any((name, frame) in self._taken for frame in frames):
-            return False
-        self._frames |= unique
-        if map_name not in self._maps:
-            self._tell_missing(map_name, len(frames))
-        return True
-
-    def recording(self, name: str, labels: Sequence[tuple[Label, str]]) -> Recording | None:
-        """A recording of the sound labels, sorted; None if there is none.
+    def recording(self, name: str, labels: Sequence[tuple[Label, str]]) -> RecordingColumns | None:
+        """What `sound` makes of plain labels.
 
         Args:
             name: Of the recording.
             labels: Each with its place in the source, for messages.
         """
-        sound: list[Label] = []
+        made = [label for label, _ in labels]
+        found = columns_of(Recording(name, made[0].map if made else "", tuple(made)))
+        return self.sound(found, [place for _, place in labels], [label.map for label in made])
+
+    def sound(
+        self, found: RecordingColumns, places: Sequence[object], maps: Sequence[str] | None = None
+    ) -> RecordingColumns | None:
+        """The sound labels of a recording, sorted; None if there is none.
+
+        Args:
+            found: Its labels in any order.
+            places: Where each label is in the source, for messages; a text is made only of what is told.
+            maps: The map of each label, if they may differ.
+        """
+        problems = find_problems(found)
+        order: list[int] = []
         times: dict[int, str] = {}
-        map_name = labels[0][0].map if labels else ""
-        problems = find_problems(columns_of(Recording(name, map_name, tuple(label for label, _ in labels))))
-        first_object = first_sensor = 0
-        for number, (label, place) in enumerate(labels):
-            objects, sensors = first_object, first_sensor
-            first_object, first_sensor = objects + len(label.objects), sensors + len(label.sensors)
-            if label.frame in self._frames or (name, label.frame) in self._taken:
-                self._leave_out(f"{place}: label id `{label.frame}` is used twice")
-            elif label.map != map_name:
-                message = f"label `{label.frame}` has map `{label.map}`, its recording began with `{map_name}`"
-                self._leave_out(f"{place}: {message}")
-            elif label.timestamp_us in times:
-                message = f"label `{label.frame}` has the time of label `{times[label.timestamp_us]}`"
-                self._leave_out(f"{place}: {message} in recording `{name}`")
+        for number, (frame, time) in enumerate(zip(found.frames, found.times_us, strict=True)):
+            if frame in self._frames or (found.name, frame) in self._taken:
+                self._leave_out(f"{places[number]}: label id `{frame}` is used twice")
+            elif maps is not None and maps[number] != found.map:
+                message = f"label `{frame}` has map `{maps[number]}`, its recording began with `{found.map}`"
+                self._leave_out(f"{places[number]}: {message}")
+            elif time in times:
+                message = f"label `{frame}` has the time of label `{times[time]}`"
+                self._leave_out(f"{places[number]}: {message} in recording `{found.name}`")
             elif number in problems.labels:
-                self._leave_out(f"{place}: label `{label.frame}` or its ego: {problems.labels[number]}")
+                self._leave_out(f"{places[number]}: label `{frame}` or its ego: {problems.labels[number]}")
             else:
-                self._frames.add(label.frame)
-                times[label.timestamp_us] = label.frame
-                of_objects = [problems.objects.get(objects + row) for row in range(len(label.objects))]
-                of_sensors = [problems.sensors.get(sensors + row) for row in range(len(label.sensors))]
-                sound.append(self._with_sound_objects(label, of_objects, of_sensors, place))
-        if not sound:
-            self._report.left_out("recording", "record-invalid", f"recording `{name}` has no sound label")
+                self._frames.add(frame)
+                times[time] = frame
+                order.append(number)
+        if not order:
+            self._report.left_out("recording", "record-invalid", f"recording `{found.name}` has no sound label")
             return None
-        if map_name not in self._maps:
-            self._tell_missing(map_name, len(sound))
-        sound.sort(key=lambda label: (label.timestamp_us, label.frame))
-        return Recording(name, map_name, tuple(sound))
+        if found.map not in self._maps:
+            self._tell_missing(found.map, len(order))
+        objects, sensors = self._sound_rows(found, problems, places, order)
+        order.sort(key=lambda number: (found.times_us[number], found.frames[number]))
+        as_it_is = order == list(range(len(found.frames)))
+        if as_it_is and objects.all() and sensors.all():
+            return found
+        return taken(found, order, objects, sensors)
 
     def _tell_missing(self, map_name: str, labels: int) -> None:
         if map_name == NO_MAP:
@@ -247,34 +246,52 @@ class Labels:
     def _leave_out(self, message: str) -> None:
         self._report.left_out("label", "record-invalid", message)
 
-    def _with_sound_objects(self, label: Label, of_objects: _Facts, of_sensors: _Facts, place: str) -> Label:
-        """A label without the objects and sensor files of which something is wrong."""
-        ids = {"ego"}
-        tracks: dict[str, str] = {} if label.ego.track is None else {label.ego.track: "ego"}
-        sound: list[LabelObject] = []
-        owner = f"of label `{label.frame}`"
-        for member, fact in zip(label.objects, of_objects, strict=True):
-            problem = fact
-            if problem is None and member.track is not None and member.track in tracks:
-                problem = f"has the track `{member.track}` of object `{tracks[member.track]}`, which is kept"
-            if member.id in ids:
-                why = "is kept for the ego" if member.id == "ego" else "is used twice"
-                self._report.left_out("object", "record-invalid", f"{place}: object id `{member.id}` {owner} {why}")
-            elif problem is not None:
-                self._report.left_out("object", "record-invalid", f"{place}: object `{member.id}` {owner}: {problem}")
-            else:
-                ids.add(member.id)
-                tracks |= {} if member.track is None else {member.track: member.id}
-                sound.append(member)
-        sensors = dict(label.sensors)
-        for channel, problem in zip(label.sensors, of_sensors, strict=True):
-            if problem is not None:
-                del sensors[channel]
-                message = f"{place}: sensor file `{channel}` {owner}: {problem}"
-                self._report.left_out("sensor file", "record-invalid", message)
-        if len(sound) == len(label.objects) and len(sensors) == len(label.sensors):
-            return label
-        return replace(label, objects=tuple(sound), sensors=sensors)
+    def _sound_rows(
+        self, found: RecordingColumns, problems: Problems, places: Sequence[object], labels: Sequence[int]
+    ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Which objects and sensor files of some labels are sound; what is not is told."""
+        ids, tracks = found.objects.id, found.objects.track
+        objects = np.ones(len(ids), dtype=bool)
+        sensors = np.ones(len(found.paths), dtype=bool)
+        ends: list[int] = np.cumsum(found.object_counts).tolist()
+        files: list[int] = np.cumsum(found.sensor_counts).tolist()
+        for label in labels:
+            first, end = ends[label] - int(found.object_counts[label]), ends[label]
+            owner, ego = f"of label `{found.frames[label]}`", found.egos.track[label]
+            names, known = set(ids[first:end]), [track for track in tracks[first:end] if track is not None]
+            odd = len(names) < end - first or "ego" in names or len(set(known)) < len(known) or ego in known
+            if odd or not problems.objects.keys().isdisjoint(range(first, end)):
+                for row, problem in _unsound(ids, tracks, range(first, end), ego, problems.objects):
+                    objects[row] = False
+                    told = f"object id `{ids[row]}` {owner} {problem}"
+                    if problem not in (_OF_EGO, _TWICE):
+                        told = f"object `{ids[row]}` {owner}: {problem}"
+                    self._report.left_out("object", "record-invalid", f"{places[label]}: {told}")
+            for row in range(files[label] - int(found.sensor_counts[label]), files[label]):
+                if (problem := problems.sensors.get(row)) is not None:
+                    sensors[row] = False
+                    message = f"{places[label]}: sensor file `{found.channels[row]}` {owner}: {problem}"
+                    self._report.left_out("sensor file", "record-invalid", message)
+        return objects, sensors
+
+
+def _unsound(
+    ids: Sequence[str], tracks: Sequence[str | None], rows: range, ego: str | None, problems: Mapping[int, str]
+) -> Iterator[tuple[int, str]]:
+    """The objects of a label that are left out, and why; of two with one id or one track the first is kept."""
+    seen = {"ego"}
+    owners: dict[str, str] = {} if ego is None else {ego: "ego"}
+    for row in rows:
+        id, track = ids[row], tracks[row]
+        if id in seen:
+            yield row, _OF_EGO if id == "ego" else _TWICE
+        elif row in problems:
+            yield row, problems[row]
+        elif track is not None and track in owners:
+            yield row, f"has the track `{track}` of object `{owners[track]}`, which is kept"
+        else:
+            seen.add(id)
+            owners |= {} if track is None else {track: id}
 
 
 def read_maps(files: Mapping[str, Path], report: Report) -> dict[str, tuple[MapFeature, ...]]:

@@ -15,7 +15,8 @@ from scenicq.importers.base import ClassNames, Entry, Labels, OpenedSource
 from scenicq.importers.folders import readable
 from scenicq.importers.recording_checks import tell_order
 from scenicq.importers.report import Report
-from scenicq.store.labels import Label, Recording
+from scenicq.store.columns import RecordingColumns
+from scenicq.store.labels import Label
 
 __all__ = ["FileReader", "RecordingFiles", "by_file_source", "content_digest", "map_sink", "missing", "take_map"]
 
@@ -59,7 +60,7 @@ class FileReader:
     classes: Mapping[str, str]
     make: Make
 
-    def recordings(self, labels: Labels, report: Report) -> Iterator[Recording]:
+    def recordings(self, labels: Labels, report: Report) -> Iterator[RecordingColumns]:
         """The recordings in order of their names."""
         classes = ClassNames(self.classes, report)
         for place in self.places:

@@ -15,7 +15,7 @@ from scenicq.importers.report import Report
 from scenicq.store.classes import is_subclass
 from scenicq.store.labels import Label, LabelObject
 
-__all__ = ["Moment", "ego_facts", "viewpoint", "with_egos"]
+__all__ = ["Moment", "ego_facts", "middle", "viewpoint", "with_egos"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +76,12 @@ def viewpoint(objects: Sequence[LabelObject]) -> LabelObject | None:
 
     None where there are no objects.
     """
-    return LabelObject("ego", "", "", *_middle(objects)) if objects else None
+    return LabelObject("ego", "", "", *_middle_of(objects)) if objects else None
+
+
+def middle(places: Sequence[tuple[float, float]]) -> tuple[float, float]:
+    """The middle of one or more places."""
+    return sum(x for x, _ in places) / len(places), sum(y for _, y in places) / len(places)
 
 
 def _ego(objects: Sequence[LabelObject], choice: str | None) -> LabelObject | None:
@@ -85,10 +90,9 @@ def _ego(objects: Sequence[LabelObject], choice: str | None) -> LabelObject | No
     vehicles = [member for member in objects if is_subclass(member.category, "Vehicle") and member.heading is not None]
     if not vehicles:
         return None
-    x, y = _middle(objects)
+    x, y = _middle_of(objects)
     return min(vehicles, key=lambda member: ((member.x - x) ** 2 + (member.y - y) ** 2, member.id))
 
 
-def _middle(objects: Sequence[LabelObject]) -> tuple[float, float]:
-    count = len(objects)
-    return sum(member.x for member in objects) / count, sum(member.y for member in objects) / count
+def _middle_of(objects: Sequence[LabelObject]) -> tuple[float, float]:
+    return middle([(member.x, member.y) for member in objects])

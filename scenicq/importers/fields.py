@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any, cast
 
 from scenicq.store.value_rules import LONGEST_NAME
@@ -24,7 +24,6 @@ __all__ = [
     "parse_json",
     "positive",
     "record",
-    "scalars",
     "text",
     "vector",
 ]
@@ -152,21 +151,6 @@ def vector(fields: Record, key: str, size: int) -> tuple[float, ...]:
     if len(value) != size:
         raise InvalidError(f"`{key}` has {len(value)} numbers, not {size}")
     return tuple([_finite(element, key) for element in value])
-
-
-def scalars(fields: Record, key: str, on_problem: Callable[[str], None]) -> dict[str, str | float | bool]:
-    """An object of texts, numbers and booleans; null values are absent, others are told and left out."""
-    if fields.get(key) is None:
-        return {}
-    sound: dict[str, str | float | bool] = {}
-    for name, value in record(fields[key], f"`{key}`").items():
-        if isinstance(value, str | bool | int) or (isinstance(value, float) and math.isfinite(value)):
-            sound[name] = value
-        elif isinstance(value, float):
-            on_problem(f"`{name}` of `{key}` is not finite")
-        elif value is not None:
-            on_problem(f"`{name}` of `{key}` is {_kind(value)}, not a text, a number or a boolean")
-    return sound
 
 
 def _present(fields: Record, key: str) -> object:

@@ -1,23 +1,20 @@
-"""Large JSON files that hold one list of objects, read block by block, each element with its line number."""
+"""Large JSON files that hold one list, read block by block, each element with its line number."""
 
 from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Generic, TypeVar
 
-import msgspec
+from msgspec import DecodeError, Raw, ValidationError
+from msgspec.json import Decoder
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.garbage import without_collector
 
-__all__ = ["ElementBlock", "Rows", "read_list"]
-
-Rows: TypeAlias = "msgspec.json.Decoder[list[Any]]"
-"""Decodes elements that are sound, as structs or what else msgspec has for objects."""
+__all__ = ["ElementBlock", "read_list"]
 
 _CHUNK = 1 << 20
 _LONGEST = 1 << 23
@@ -28,56 +25,56 @@ _GAP = re.compile(r"[\s,]*")
 _BETWEEN = re.compile(r"\}\s{0,99},\s{0,99}\{")
 
 _decode = json.JSONDecoder().raw_decode
+_ELEMENTS = Decoder(list[Raw])
+T = TypeVar("T")
 
 
-class ElementBlock:
+class ElementBlock(Generic[T]):
     """Neighbouring elements of a list.
 
     Attributes:
         text: What they were read from, from the beginning of the first to the end of the last.
-        rows: The elements as the decoder has them; None where they were not asked for, or not all are sound.
+        rows: The elements, if all are what they must be; else each has to be looked at.
     """
 
     __slots__ = ("_elements", "_first", "_lines", "rows", "text")
 
-    def __init__(
-        self, text: str, first: int, *, elements: list[Any] | None = None, rows: list[Any] | None = None
-    ) -> None:
-        """Take a text, the line where it begins, and the elements in one form at least."""
+    def __init__(self, text: str, first: int, rows: list[T] | None, *, alone: bool = False) -> None:
+        """Take a text, the line where it begins, its elements, and whether it is one alone."""
         self.text = text
         self.rows = rows
-        self._elements = elements
+        self._elements: Sequence[bytes | Raw] | None = [text.encode()] if alone else None
         self._first = first
         self._lines: list[int] = []
 
     @property
-    def elements(self) -> list[Any]:
-        """One or more elements as `json` decodes them; where there are rows, only when they are asked for."""
+    def elements(self) -> Sequence[bytes | Raw]:
+        """The text of each; of one that is alone it may be no JSON but what Python takes for such, as NaN."""
         if self._elements is None:
-            self._elements = json.loads(f"[{self.text}]")
+            self._elements = _ELEMENTS.decode(f"[{self.text}]")
         return self._elements
 
     def line(self, number: int) -> int:
         """The line of the file where an element begins; found only when it is asked for, as few are."""
         if not self._lines:
-            line, position = self._first, 0
-            for _ in self.elements:
-                line, position = _skip_gap(self.text, line, position)
+            text, line, before = self.text.encode(), self._first, 0
+            for element in self.elements:
+                start = text.index(element, before)
+                line += text.count(b"\n", before, start)
                 self._lines.append(line)
-                _, end = _decode(self.text, position)
-                line += self.text.count("\n", position, end)
-                position = end
+                line += bytes(element).count(b"\n")
+                before = start + len(bytes(element))
         return self._lines[number]
 
 
-def read_list(path: Path, rows: Rows | None = None) -> Iterator[ElementBlock]:
+def read_list(path: Path, rows: Decoder[list[T]]) -> Iterator[ElementBlock[T]]:
     """The elements of a JSON list in order.
 
     Memory is that of a chunk of the file and of what it holds, or of one element.
 
     Args:
         path: The file.
-        rows: Makes rows of sound elements, in a fraction of the time that `json` needs.
+        rows: Decodes elements that are what they must be.
 
     Raises:
         DataError: `file-missing`, or `file-invalid` with file and line, after the elements before.
@@ -94,11 +91,11 @@ def read_list(path: Path, rows: Rows | None = None) -> Iterator[ElementBlock]:
                 line, position = _skip_gap(buffer, line, position)
                 if buffer.startswith("]", position):
                     return
-                block = _at_once(buffer, position, line, rows) if untried else None
+                block = _many(buffer, position, line, rows) if untried else None
                 untried = False
                 if block is None:
                     try:
-                        element, end = _decode(buffer, position)
+                        _, end = _decode(buffer, position)
                     except RecursionError as error:
                         raise _invalid(path, line, "is nested too deeply") from error
                     except ValueError as error:
@@ -108,7 +105,7 @@ def read_list(path: Path, rows: Rows | None = None) -> Iterator[ElementBlock]:
                             raise _invalid(path, line, "is cut off or is not JSON here") from error
                         buffer, position, untried = buffer[position:] + more, 0, True
                         continue
-                    block = ElementBlock(buffer[position:end], line, elements=[element])
+                    block = ElementBlock[T](buffer[position:end], line, None, alone=True)
                 yield block
                 line += block.text.count("\n")
                 position += len(block.text)
@@ -124,23 +121,25 @@ def _skip_gap(text: str, line: int, position: int) -> tuple[int, int]:
     return line + text.count("\n", position, end), end
 
 
-def _at_once(buffer: str, position: int, line: int, rows: Rows | None) -> ElementBlock | None:
-    """All elements but what may be cut off; None where they must be read one by one.
+def _many(buffer: str, position: int, line: int, rows: Decoder[list[T]]) -> ElementBlock[T] | None:
+    """All elements but what may be cut off; None where it is not known where they end.
 
-    Wherever the text is cut but between two elements of the list, it is left with an open string or bracket. So what
-    is JSON here would have been read the same one by one.
+    Wherever the text is cut but between two elements of the list, it is left with an open string or bracket, which is
+    no JSON.
     """
     ends = [between.start() + 1 for between in _BETWEEN.finditer(buffer, max(position, len(buffer) - _TAIL))]
     if not ends:
         return None
     text = buffer[position : ends[-1]]
-    with without_collector():
-        if rows is not None:
-            with suppress(RecursionError, msgspec.DecodeError):
-                return ElementBlock(text, line, rows=rows.decode(f"[{text}]"))
-        with suppress(RecursionError, ValueError):
-            return ElementBlock(text, line, elements=json.loads(f"[{text}]"))
-    return None
+    try:
+        try:
+            with without_collector():
+                return ElementBlock(text, line, rows.decode(f"[{text}]"))
+        except ValidationError:
+            _ELEMENTS.decode(f"[{text}]")
+            return ElementBlock[T](text, line, None)
+    except (DecodeError, RecursionError):
+        return None
 
 
 def _invalid(path: Path, line: int, what: str) -> DataError:

@@ -1,32 +1,112 @@
-"""Rows of the tables of nuScenes that are large, as msgspec decodes them where all of a block are sound.
-
-They hold what is used, and `Raw` in place of what means nothing here. Rows that msgspec refuses, as it does where a
-field is not one of these, are for `json`, and for what tells what is wrong with them or is not read.
-"""
+"""Rows of the tables of nuScenes: their fields, and `Raw` in place of what means nothing here in large tables."""
 
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, TypeAlias
+from typing import Any
 
-from msgspec import DecodeError, Meta, Raw, Struct
-from msgspec.json import Decoder, decode
+from msgspec import DecodeError, Raw, Struct
+from msgspec.json import decode
 
-__all__ = ["ANNOTATIONS", "EGO_POSES", "SENSOR_FILES", "Annotation", "EgoPose", "SensorFile", "moment"]
+from scenicq.importers.specification import specification
+from scenicq.importers.typed_rows import ABSENT, FullText, Length, RowType, Words
 
-_Text: TypeAlias = Annotated[str, Meta(min_length=1)]
-_Length: TypeAlias = Annotated[float, Meta(gt=0)]
-_Count: TypeAlias = Annotated[int, Meta(ge=1 - 2**63, le=2**63 - 1)]
+__all__ = [
+    "ANNOTATIONS",
+    "ATTRIBUTES",
+    "CATEGORIES",
+    "EGO_POSES",
+    "INSTANCES",
+    "LOGS",
+    "MOUNTED_SENSORS",
+    "SAMPLES",
+    "SCENES",
+    "SENSORS",
+    "SENSOR_FILES",
+    "VISIBILITIES",
+    "Annotation",
+    "EgoPose",
+    "LogRow",
+    "SampleRow",
+    "SceneRow",
+    "SensorFile",
+    "TableRow",
+    "moment",
+]
 
 
-_NOTHING = Raw(b"null")
+class TableRow(Struct, kw_only=True, forbid_unknown_fields=True):
+    """A row of any table."""
+
+    token: FullText
 
 
-class Annotation(Struct, gc=False, frozen=True, forbid_unknown_fields=True):
+class LogRow(TableRow):
+    """A row of `log`."""
+
+    location: FullText
+    logfile: Words | None = None
+    date_captured: Words | None = None
+
+
+class SceneRow(TableRow):
+    """A row of `scene`; a description that is no text says nothing."""
+
+    name: FullText
+    log_token: FullText
+    description: Any = None
+
+
+class SampleRow(TableRow):
+    """A row of `sample`; some datasets in this layout have shares of a microsecond."""
+
+    scene_token: FullText
+    timestamp: int | float
+    next: Raw = ABSENT
+    prev: Raw = ABSENT
+
+
+class CategoryRow(TableRow):
+    """A row of `category` or of `attribute`."""
+
+    name: FullText
+
+
+class VisibilityRow(TableRow):
+    """A row of `visibility`."""
+
+    level: FullText
+
+
+class InstanceRow(TableRow):
+    """A row of `instance`."""
+
+    category_token: FullText
+    nbr_annotations: Raw = ABSENT
+    first_annotation_token: Raw = ABSENT
+    last_annotation_token: Raw = ABSENT
+
+
+class SensorRow(TableRow):
+    """A row of `sensor`."""
+
+    channel: FullText
+
+
+class MountedSensorRow(TableRow):
+    """A row of `calibrated_sensor`, without what says how a camera sees."""
+
+    sensor_token: FullText
+    translation: Raw = ABSENT
+    rotation: Raw = ABSENT
+    camera_intrinsic: Raw = ABSENT
+
+
+class Annotation(TableRow, kw_only=True, gc=False):
     """A row of `sample_annotation`.
 
     Attributes:
-        token, sample_token, instance_token: Of the annotation, its sample and its instance.
+        sample_token, instance_token: Of its sample and its instance.
         translation: x, y, z in metres.
         size: Width, length, height in metres.
         rotation: Quaternion w, x, y, z.
@@ -34,71 +114,61 @@ class Annotation(Struct, gc=False, frozen=True, forbid_unknown_fields=True):
         num_lidar_pts, num_radar_pts: How many points were measured on it.
     """
 
-    token: _Text
-    sample_token: _Text
-    instance_token: _Text
+    sample_token: FullText
+    instance_token: FullText
     translation: tuple[float, float, float]
-    size: tuple[_Length, _Length, _Length]
+    size: tuple[Length, Length, Length]
     rotation: tuple[float, float, float, float]
     attribute_tokens: tuple[str, ...] | None = None
-    visibility_token: str | None = None
-    num_lidar_pts: _Count | None = None
-    num_radar_pts: _Count | None = None
-    next: Raw = _NOTHING
-    prev: Raw = _NOTHING
+    visibility_token: Words | None = None
+    num_lidar_pts: int | float | None = None
+    num_radar_pts: int | float | None = None
+    next: Raw = ABSENT
+    prev: Raw = ABSENT
 
 
-class _Row(Struct, forbid_unknown_fields=True):
-    """A row that is read like a record of `json`."""
+class SensorFile(TableRow):
+    """A row of `sample_data`; what is no key frame need not have the rest, and what is no size is none of an image."""
 
-    def get(self, key: str) -> Any:
-        """The value of a field."""
-        return getattr(self, key)
-
-    __getitem__ = get
-
-
-class SensorFile(_Row):
-    """A row of `sample_data`."""
-
-    token: _Text
-    sample_token: _Text
-    ego_pose_token: _Text
-    calibrated_sensor_token: _Text
-    filename: _Text
-    is_key_frame: bool
-    width: _Count | None = None
-    height: _Count | None = None
-    fileformat: Raw = _NOTHING
-    timestamp: Raw = _NOTHING
-    next: Raw = _NOTHING
-    prev: Raw = _NOTHING
+    sample_token: Words | None = None
+    ego_pose_token: Words | None = None
+    calibrated_sensor_token: Words | None = None
+    filename: Words | None = None
+    is_key_frame: bool | None = None
+    width: Any = None
+    height: Any = None
+    fileformat: Raw = ABSENT
+    timestamp: Raw = ABSENT
+    next: Raw = ABSENT
+    prev: Raw = ABSENT
 
 
-class EgoPose(_Row):
+class EgoPose(TableRow):
     """A row of `ego_pose`."""
 
-    token: _Text
-    translation: Annotated[list[float], Meta(min_length=3, max_length=3)]
-    rotation: Annotated[list[float], Meta(min_length=4, max_length=4)]
-    timestamp: Raw = _NOTHING
+    translation: tuple[float, float, float]
+    rotation: tuple[float, float, float, float]
+    timestamp: Raw = ABSENT
 
 
-def moment(value: object) -> float:
-    """The `timestamp` of a row, in microseconds; inf where it is none."""
+def moment(value: Raw) -> float:
+    """A `timestamp` in microseconds; inf where it is none."""
     try:
-        known = decode(value) if isinstance(value, Raw) else value
-        found = float(known) if isinstance(known, int | float) and not isinstance(known, bool) else math.inf
-    except (DecodeError, OverflowError):
+        return min(float(decode(value, type=float)), math.inf)
+    except DecodeError:
         return math.inf
-    return found if math.isfinite(found) else math.inf
 
 
-ANNOTATIONS = Decoder(list[Annotation])
-"""Decodes rows of `sample_annotation`."""
-
-SENSOR_FILES = Decoder(list[SensorFile])
-"""Decodes rows of `sample_data`."""
-
-EGO_POSES = Decoder(list[EgoPose])
-"""Decodes rows of `ego_pose`."""
+_KNOWN = specification("nuscenes")
+LOGS = RowType(LogRow, _KNOWN, "log", "token")
+SCENES = RowType(SceneRow, _KNOWN, "scene", "token")
+SAMPLES = RowType(SampleRow, _KNOWN, "sample", "token")
+CATEGORIES = RowType(CategoryRow, _KNOWN, "category", "token")
+ATTRIBUTES = RowType(CategoryRow, _KNOWN, "attribute", "token")
+VISIBILITIES = RowType(VisibilityRow, _KNOWN, "visibility", "token")
+INSTANCES = RowType(InstanceRow, _KNOWN, "instance", "token")
+SENSORS = RowType(SensorRow, _KNOWN, "sensor", "token")
+MOUNTED_SENSORS = RowType(MountedSensorRow, _KNOWN, "calibrated_sensor", "token")
+ANNOTATIONS = RowType(Annotation, _KNOWN, "sample_annotation", "token")
+SENSOR_FILES = RowType(SensorFile, _KNOWN, "sample_data", "token")
+EGO_POSES = RowType(EgoPose, _KNOWN, "ego_pose", "token")

@@ -13,11 +13,9 @@ from numpy.typing import NDArray
 
 from scenicq.geometry.camera import Camera
 from scenicq.importers.base import ClassNames, Labels
-from scenicq.importers.label_rows import labels_of
 from scenicq.importers.nuscenes_boxes import Boxes
 from scenicq.importers.report import Report
 from scenicq.store.columns import MemberColumns, RecordingColumns, to_json
-from scenicq.store.labels import Recording
 
 __all__ = [
     "AXLE_TO_CENTRE_M",
@@ -109,7 +107,7 @@ class SceneReader:
     scenes: tuple[SceneContent, ...] = field(repr=False)
     classes: Mapping[str, str]
 
-    def recordings(self, labels: Labels, report: Report) -> Iterator[Recording | RecordingColumns]:
+    def recordings(self, labels: Labels, report: Report) -> Iterator[RecordingColumns]:
         """The recordings in order of their names."""
         classes = ClassNames(self.classes, report)
         for scene in self.scenes:
@@ -117,16 +115,8 @@ class SceneReader:
                 if instant.pose is None:
                     message = f"{instant.place}: sample `{instant.token}` has no sound ego pose"
                     report.left_out("label", "record-invalid", message)
-            columns = _columns(scene, classes)
-            ids = set(columns.objects.id)
-            sound = len(ids) == len(columns.objects.id) and "ego" not in ids
-            sound = sound and 0 < len(columns.frames) == len(set(columns.times_us))
-            if sound and labels.accept(columns):
-                yield columns
-                continue
             places = [instant.place for instant in scene.instants if instant.pose is not None]
-            found = labels.recording(scene.name, list(zip(labels_of(columns), places, strict=True)))
-            if found is not None:
+            if (found := labels.sound(_columns(scene, classes), places)) is not None:
                 yield found
 
 

@@ -7,27 +7,30 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from scenicq.geometry.camera import Camera
 from scenicq.importers import fields
+from scenicq.importers import nuscenes_rows as tables
 from scenicq.importers.cameras import Mount, Pose, posed
 from scenicq.importers.cameras import pose_of as vehicle_pose
-from scenicq.importers.fields import InvalidError, Record
-from scenicq.importers.json_tables import ElementBlock, Rows, read_list
-from scenicq.importers.nuscenes_boxes import Box, Boxes, BoxReader, found, joined, of_rows, pose
-from scenicq.importers.nuscenes_rows import ANNOTATIONS, EGO_POSES, SENSOR_FILES, moment
+from scenicq.importers.fields import InvalidError
+from scenicq.importers.json_tables import ElementBlock, read_list
+from scenicq.importers.nuscenes_boxes import Boxes, BoxReader, headings, joined, norms_of, vectors
 from scenicq.importers.nuscenes_scenes import POSE_CHANNEL, Instant, SceneContent
 from scenicq.importers.recording_checks import tell_order
 from scenicq.importers.report import Report
-from scenicq.importers.specification import specification
+from scenicq.importers.typed_rows import ABSENT, RowError, RowType, whole
 
 __all__ = ["Tables"]
+
+R = TypeVar("R", bound=tables.TableRow)
+V = TypeVar("V")
 
 _LARGEST_TIME = 1 << 62
 _ZONE = re.compile(r"([+-])(\d\d)(\d\d)$")
@@ -81,7 +84,7 @@ class _Place:
 
     __slots__ = ("_block", "_file", "_number")
 
-    def __init__(self, file: str, block: ElementBlock, number: int) -> None:
+    def __init__(self, file: str, block: ElementBlock[Any], number: int) -> None:
         self._file = file
         self._block = block
         self._number = number
@@ -96,18 +99,19 @@ class Tables:
     def __init__(self, folder: Path, report: Report) -> None:
         self._folder = folder
         self._report = report
-        logs = self._keyed("log", _log)
+        logs = self._keyed(tables.LOGS, _log)
         self.scenes: dict[str, _Scene] = {}
-        for token, row, place in self._rows("scene", "recording"):
-            self._try("recording", place, lambda: self._add_scene(token, row, logs))  # noqa: B023
-        self.locations = sorted({scene.log.location for scene in self.scenes.values()})
+        for scene, place in self._rows(tables.SCENES, "recording"):
+            self._try("recording", place, lambda: self._add_scene(scene, logs), f"scene `{scene.token}`")  # noqa: B023
+        self.locations = sorted({each.log.location for each in self.scenes.values()})
         self.samples: dict[str, tuple[str, _Sample]] = {}
         self.samples_of: defaultdict[str, list[_Sample]] = defaultdict(list)
-        for token, row, place in self._rows("sample", "label"):
-            self._try("label", place, lambda: self._add_sample(token, row, place))  # noqa: B023
+        for sample, place in self._rows(tables.SAMPLES, "label"):
+            self._try("label", place, lambda: self._add_sample(sample, place), f"sample `{sample.token}`")  # noqa: B023
         self.sensors: defaultdict[str, dict[str, tuple[str, Camera | None]]] = defaultdict(dict)
         self.poses = self._read_sensor_files()
-        self._classes: dict[str, str] = self._read_classes()
+        names = self._keyed(tables.CATEGORIES, lambda row: row.name)
+        self._classes = self._keyed(tables.INSTANCES, lambda row: _found(names, row.category_token, "category"))
         self._read_boxes()
 
     def scene(self, token: str) -> SceneContent:
@@ -134,73 +138,65 @@ class Tables:
             scene.name, scene.log.location, scene.log.ahead_s, params, instants, replace(boxes, tracks=numbers), tracks
         )
 
-    def _add_scene(self, token: str, row: Record, logs: Mapping[str, _Log]) -> None:
-        name = fields.text(row, "name")
-        log: _Log = found(logs, fields.text(row, "log_token"), "log")
-        if any(scene.name == name for scene in self.scenes.values()):
-            raise InvalidError(f"scene name `{name}` is used twice")
-        self.scenes[token] = _Scene(name, log, _params(row.get("description"), log))
+    def _add_scene(self, row: tables.SceneRow, logs: Mapping[str, _Log]) -> None:
+        log = _found(logs, row.log_token, "log")
+        if any(scene.name == row.name for scene in self.scenes.values()):
+            raise InvalidError(f"scene name `{row.name}` is used twice")
+        self.scenes[row.token] = _Scene(row.name, log, _params(row.description, log))
 
-    def _add_sample(self, token: str, row: Record, place: _Place) -> None:
-        scene = fields.text(row, "scene_token")
-        sample = _Sample(token, self._time(row), str(place))
-        found(self.scenes, scene, "scene")
-        if token in self.samples:
-            raise InvalidError(f"sample `{token}` is there twice")
-        self.samples[token] = (scene, sample)
-        self.samples_of[scene].append(sample)
+    def _add_sample(self, row: tables.SampleRow, place: _Place) -> None:
+        sample = _Sample(row.token, self._time(row), str(place))
+        _found(self.scenes, row.scene_token, "scene")
+        if row.token in self.samples:
+            raise InvalidError(f"sample `{row.token}` is there twice")
+        self.samples[row.token] = (row.scene_token, sample)
+        self.samples_of[row.scene_token].append(sample)
 
-    def _time(self, row: Record) -> int:
+    def _time(self, row: tables.SampleRow) -> int:
         """Microseconds; some datasets in this layout have shares of one."""
-        try:
-            return fields.integer(row, "timestamp")
-        except InvalidError:
-            if not isinstance(row.get("timestamp"), float):
-                raise
-            time = round(fields.number(row, "timestamp"))
-            if abs(time) > _LARGEST_TIME:
-                raise
+        if isinstance(row.timestamp, float) and not row.timestamp.is_integer() and abs(row.timestamp) <= _LARGEST_TIME:
             message = "times are no whole numbers of microseconds; they are rounded"
             self._report.assumed("sample", "rounded times", message)
-            return time
+            return round(row.timestamp)
+        return whole(row.timestamp, "timestamp")
 
     def _read_sensor_files(self) -> dict[str, tuple[float, float, float, float]]:
         """Fill in the files of each sample; the result is x, y, heading and z of its ego."""
-        channels = self._keyed("sensor", lambda row: fields.text(row, "channel"))
+        channels = self._keyed(tables.SENSORS, lambda row: row.channel)
         mounted: dict[str, _Mounted] = {}
-        for token, row, place in self._rows("calibrated_sensor", "record"):
-            name = f"calibrated_sensor `{token}`"
-            of = self._try(
-                "record", place, lambda row=row: found(channels, fields.text(row, "sensor_token"), "sensor"), name
-            )
+        for row, place in self._rows(tables.MOUNTED_SENSORS, "record"):
+            name = f"calibrated_sensor `{row.token}`"
+            of = self._try("record", place, lambda row=row: _found(channels, row.sensor_token, "sensor"), name)
             if of is not None:
-                mounted[token] = _Mounted(of, self._try("camera", place, lambda row=row: _mount(row), name))
+                mounted[row.token] = _Mounted(of, self._try("camera", place, lambda row=row: _mount(row), name))
         pose_of: dict[str, str] = {}
         nearest: dict[str, tuple[float, str, str]] = {}
         images: defaultdict[str, list[_Image]] = defaultdict(list)
         sweeps = strays = 0
-        for token, row, place in self._rows("sample_data", "sensor file", SENSOR_FILES):
-            is_sweep = row.get("is_key_frame") is not True
-            if is_sweep or str(row.get("sample_token")) not in self.samples:
+        for row, place in self._rows(tables.SENSOR_FILES, "sensor file"):
+            is_sweep = row.is_key_frame is not True
+            if is_sweep or row.sample_token not in self.samples:
                 sweeps += is_sweep
                 strays += not is_sweep
                 continue
 
-            def add(row: Record = row) -> None:
-                sensor: _Mounted = found(mounted, fields.text(row, "calibrated_sensor_token"), "calibrated_sensor")
-                sample, size = fields.text(row, "sample_token"), [row.get(key) for key in ("width", "height")]
-                self.sensors[sample][sensor.channel] = fields.text(row, "filename"), None
+            def add(row: tables.SensorFile = row, sample: str = row.sample_token) -> None:
+                sensor = _found(
+                    mounted, _present(row.calibrated_sensor_token, "calibrated_sensor_token"), "calibrated_sensor"
+                )
+                self.sensors[sample][sensor.channel] = _present(row.filename, "filename"), None
                 if sensor.channel == POSE_CHANNEL:
-                    pose_of[sample] = fields.text(row, "ego_pose_token")
+                    pose_of[sample] = _present(row.ego_pose_token, "ego_pose_token")
                 elif sample not in pose_of:
-                    away = abs(moment(row.get("timestamp")) - self.samples[sample][1].time)
-                    other = (away, sensor.channel, fields.text(row, "ego_pose_token"))
+                    away = abs(tables.moment(row.timestamp) - self.samples[sample][1].time)
+                    other = (away, sensor.channel, _present(row.ego_pose_token, "ego_pose_token"))
                     nearest[sample] = min(other, nearest.get(sample, other))
-                width, height = (pixels if type(pixels) is int else 0 for pixels in size)
+                width, height = (pixels if type(pixels) is int else 0 for pixels in (row.width, row.height))
                 if sensor.mount is not None and width > 0 and height > 0:
-                    images[fields.text(row, "ego_pose_token")].append(_Image(sample, sensor, width, height))
+                    token = _present(row.ego_pose_token, "ego_pose_token")
+                    images[token].append(_Image(sample, sensor, width, height))
 
-            self._try("sensor file", place, add, f"sample_data `{token}`")
+            self._try("sensor file", place, add, f"sample_data `{row.token}`")
         self._report.not_read("sample_data/sweeps", sweeps)
         self._report.not_read("sample_data of samples that are not there", strays)
         for sample, (_, _, token) in nearest.items():
@@ -211,16 +207,20 @@ class Tables:
                 )
                 self._report.assumed("sample", "ego pose", message)
         wanted = {*pose_of.values(), *images}
-        poses: dict[str, tuple[float, float, float, float]] = {}
-        for token, row, place in self._rows("ego_pose", "ego pose", EGO_POSES):
-            if token not in wanted:
+        rows: list[tables.EgoPose] = []
+        for row, place in self._rows(tables.EGO_POSES, "ego pose"):
+            if row.token not in wanted:
                 continue
-            made = self._try("ego pose", place, lambda row=row: pose(row), f"ego_pose `{token}`")
-            if made is not None:
-                poses[token] = made
-                vehicle = vehicle_pose(tuple(row["rotation"]), tuple(row["translation"]))
-                for image in images.get(token, ()):
+            name = f"ego_pose `{row.token}`"
+            vehicle = self._try("ego pose", place, lambda row=row: vehicle_pose(row.rotation, row.translation), name)
+            if vehicle is not None:
+                rows.append(row)
+                for image in images.get(row.token, ()):
                     self._try("camera", place, lambda image=image, vehicle=vehicle: self._add_camera(image, vehicle))
+        turns = [row.rotation for row in rows]
+        turned: list[float] = headings(vectors(turns, 4), norms_of(turns)).tolist()
+        poses = {row.token: (*row.translation[:2], heading, row.translation[2])
+                 for row, heading in zip(rows, turned, strict=True)}  # fmt: skip
         return {sample: poses[token] for sample, token in pose_of.items() if token in poses}
 
     def _add_camera(self, image: _Image, vehicle: Pose) -> None:
@@ -229,21 +229,18 @@ class Tables:
             camera = posed(mount, vehicle, image.width, image.height)
             self.sensors[image.sample][channel] = self.sensors[image.sample][channel][0], camera
 
-    def _read_classes(self) -> dict[str, str]:
-        """Class name of each instance."""
-        names = self._keyed("category", lambda row: fields.text(row, "name"))
-        return self._keyed("instance", lambda row: found(names, fields.text(row, "category_token"), "category"))
-
     def _read_boxes(self) -> None:
-        attributes = self._keyed("attribute", lambda row: fields.text(row, "name"))
+        attributes = self._keyed(tables.ATTRIBUTES, lambda row: row.name)
         visible: dict[str, str] = {}
         if (self._folder / "visibility.json").is_file():
-            visible = self._keyed("visibility", lambda row: fields.text(row, "level"))
+            visible = self._keyed(tables.VISIBILITIES, lambda row: row.level)
         sample_numbers = {token: number for number, token in enumerate(self.samples)}
         track_numbers = {token: number for number, token in enumerate(sorted(self._classes))}
         reader = BoxReader(sample_numbers, track_numbers, attributes, visible)
         path = self._folder / "sample_annotation.json"
-        self._boxes = joined([self._boxes_in(reader, path.name, block) for block in read_list(path, ANNOTATIONS)])
+        self._boxes = joined(
+            [self._boxes_in(reader, path.name, block) for block in read_list(path, tables.ANNOTATIONS.many)]
+        )
         self._tracks: list[tuple[str, str]] = [(token, self._classes[token]) for token in track_numbers]
         # Boxes by scene, then by sample; those of one sample as they come.
         counts: list[int] = np.bincount(self._boxes.samples, minlength=len(self.samples)).tolist()
@@ -266,52 +263,49 @@ class Tables:
                 first += self._boxes_of[sample.token]
         self._order = np.argsort(rank[self._boxes.samples], kind="stable")
 
-    def _boxes_in(self, reader: BoxReader, file: str, block: ElementBlock) -> Boxes:
-        boxes = reader.columns(block.rows) if block.rows is not None else None
-        if boxes is not None:
-            return boxes
-        rows: list[Box] = []
-        for token, row, place in self._rows_in(block, file, "object"):
-            box = self._try("object", place, lambda: reader.row(token, row), f"annotation `{token}`")  # noqa: B023
-            if box is not None:
-                rows.append(box)
-        return of_rows(rows)
+    def _boxes_in(self, reader: BoxReader, file: str, block: ElementBlock[tables.Annotation]) -> Boxes:
+        rows, numbers = self._rows_of(tables.ANNOTATIONS, block, file, "object")
 
-    def _keyed(self, table: str, value: Callable[[Record], Any]) -> dict[str, Any]:
-        values: dict[str, Any] = {}
-        for token, row, place in self._rows(table, "record"):
-            made = self._try("record", place, lambda row=row: value(row), f"{table} `{token}`")
+        def tell(number: int, problem: str) -> None:
+            message = f"{file}:{block.line(numbers[number])}: annotation `{rows[number].token}`: {problem}"
+            self._report.left_out("object", "record-invalid", message)
+
+        return reader.boxes(rows, tell)
+
+    def _keyed(self, table: RowType[R], value: Callable[[R], V]) -> dict[str, V]:
+        values: dict[str, V] = {}
+        for row, place in self._rows(table, "record"):
+            made = self._try("record", place, lambda row=row: value(row), f"{table.at} `{row.token}`")
             if made is not None:
-                values[token] = made
+                values[row.token] = made
         return values
 
-    def _rows(self, table: str, what: str, decoder: Rows | None = None) -> Iterator[tuple[str, Record, _Place]]:
-        """Token, fields and place of each row."""
-        path = self._folder / f"{table}.json"
-        for block in read_list(path, decoder):
-            yield from self._rows_in(block, path.name, what, block.rows)
+    def _rows(self, table: RowType[R], what: str) -> Iterator[tuple[R, _Place]]:
+        """Each row with its place."""
+        path = self._folder / f"{table.at}.json"
+        for block in read_list(path, table.many):
+            for row, number in zip(*self._rows_of(table, block, path.name, what), strict=True):
+                yield row, _Place(path.name, block, number)
 
-    def _rows_in(
-        self, block: ElementBlock, file: str, what: str, decoded: list[Any] | None = None
-    ) -> Iterator[tuple[str, Record, _Place]]:
-        # only where a character is named by its number can there be half of one
-        escapes = decoded is None and "\\u" in block.text
-        known = specification("nuscenes")
-        for number, element in enumerate(block.elements if decoded is None else decoded):
-            place = _Place(file, block, number)
+    def _rows_of(
+        self, table: RowType[R], block: ElementBlock[R], file: str, what: str
+    ) -> tuple[Sequence[R], Sequence[int]]:
+        """The rows of a block that are what they must be, with their numbers."""
+        if block.rows is not None:
+            return block.rows, range(len(block.rows))
+        rows: list[R] = []
+        numbers: list[int] = []
+        for number, element in enumerate(block.elements):
             try:
-                row = element if decoded is not None else fields.record(element, "it")
-                if escapes:
-                    fields.check_characters(row)
-                token = fields.text(row, "token")
+                rows.append(table.decode(element, self._report))
+                numbers.append(number)
             except InvalidError as error:
-                self._report.left_out(what, "record-invalid", f"{place}: {error}")
-            else:
-                if decoded is None:
-                    known.count_rows((row,), self._report, file.removesuffix(".json"))
-                yield token, row, place
+                name = f"{table.at} `{error.name}`: " if isinstance(error, RowError) and error.name else ""
+                name = name.replace("sample_annotation", "annotation")
+                self._report.left_out(what, "record-invalid", f"{file}:{block.line(number)}: {name}{error}")
+        return rows, numbers
 
-    def _try(self, what: str, place: _Place, make: Callable[[], Any], name: str = "") -> Any:
+    def _try(self, what: str, place: _Place, make: Callable[[], V], name: str = "") -> V | None:
         try:
             return make()
         except InvalidError as error:
@@ -320,25 +314,48 @@ class Tables:
             return None
 
 
-def _log(row: Record) -> _Log:
+def _present(value: str | None, key: str) -> str:
+    """A field that not every row needs.
+
+    Raises:
+        InvalidError: It is missing.
+    """
+    if not value:
+        raise InvalidError(f"`{key}` is missing")
+    return value
+
+
+def _found(table: Mapping[str, V], token: str, name: str) -> V:
+    """What a table has for a token.
+
+    Raises:
+        InvalidError: Nothing.
+    """
+    if token not in table:
+        raise InvalidError(f"{name} `{token}` is not there")
+    return table[token]
+
+
+def _log(row: tables.LogRow) -> _Log:
     """What matters of a log."""
-    zone = _ZONE.search(fields.optional_text(row, "logfile") or "")
+    zone = _ZONE.search(row.logfile or "")
     ahead = None
     if zone is not None:
         ahead = int(f"{zone[1]}1") * (int(zone[2]) * 3600 + int(zone[3]) * 60)
-    return _Log(fields.text(row, "location"), fields.optional_text(row, "date_captured"), ahead)
+    return _Log(row.location, row.date_captured or None, ahead)
 
 
-def _mount(row: Record) -> Mount | None:
+def _mount(row: tables.MountedSensorRow) -> Mount | None:
     """How a sensor sees, where it is a camera."""
-    matrix = row.get("camera_intrinsic")
-    if not matrix:
+    raws = {"translation": row.translation, "rotation": row.rotation, "camera_intrinsic": row.camera_intrinsic}
+    told = {name: fields.parse_json(bytes(raw)) for name, raw in raws.items() if raw is not ABSENT}
+    if not told.get("camera_intrinsic"):
         return None
     rows = [fields.vector({"camera_intrinsic": line}, "camera_intrinsic", 3) for line in
-            fields.items(row, "camera_intrinsic")]  # fmt: skip
+            fields.items(told, "camera_intrinsic")]  # fmt: skip
     if len(rows) != 3:
         raise InvalidError("`camera_intrinsic` has not three rows")
-    pose = vehicle_pose(fields.vector(row, "rotation", 4), fields.vector(row, "translation", 3))
+    pose = vehicle_pose(fields.vector(told, "rotation", 4), fields.vector(told, "translation", 3))
     return Mount(pose, (rows[0][0], rows[1][1], rows[0][2], rows[1][2]))
 
 

@@ -25,8 +25,6 @@ from scenicq.importers.base import Entry, Labels, Reader
 from scenicq.importers.recording_checks import tell_recording
 from scenicq.importers.report import MOST_TOLD, Report
 from scenicq.processes import Lost, Workers, as_many_as_pay
-from scenicq.store.columns import columns_of
-from scenicq.store.labels import Recording
 from scenicq.store.schema import SCHEMA_VERSION, SEGMENT_TABLES, ArrowTable
 from scenicq.store.segment import MapIndexes, Segment, SegmentWriter, SourceRecording
 
@@ -220,10 +218,9 @@ def _read(
     """Read a recording from the source."""
     report = Report(strict=world.strict)
     for found in share.reader.recordings(Labels(world.maps.keys(), report, job.taken), report):
-        columns = columns_of(found) if isinstance(found, Recording) else found
-        tell_recording(columns, report)
-        writer.add(columns, indexes.of(columns.map))
-        on_recording(columns.name, len(columns.frames))
+        tell_recording(found, report)
+        writer.add(found, indexes.of(found.map))
+        on_recording(found.name, len(found.frames))
     return SourceRecording(share.fingerprint, report.tally, report.told)
 
 

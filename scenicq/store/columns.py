@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,7 @@ __all__ = [
     "RecordingColumns",
     "columns_of",
     "second_of_track",
+    "taken",
     "to_json",
 ]
 
@@ -58,6 +59,10 @@ class MemberColumns:
     z: NDArray[np.float64] | None = None
     pitch: NDArray[np.float64] | None = None
     roll: NDArray[np.float64] | None = None
+
+    def take(self, rows: NDArray[np.int64]) -> MemberColumns:
+        """Those of some rows, in their order."""
+        return MemberColumns(**{each.name: _some(getattr(self, each.name), rows) for each in fields(self)})
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -132,6 +137,54 @@ def second_of_track(recording: RecordingColumns) -> int | None:
                 return row
             seen.add((label, track))
     return None
+
+
+def taken(
+    recording: RecordingColumns, labels: Sequence[int], objects: NDArray[np.bool_], sensors: NDArray[np.bool_]
+) -> RecordingColumns:
+    """Some labels of a recording, in another order.
+
+    Args:
+        recording: The recording.
+        labels: Numbers of its labels.
+        objects: Which of all objects stay with their labels, shape (n,).
+        sensors: The same of sensor files.
+    """
+    numbers = np.array(labels, dtype=np.int64)
+    own, object_counts = _rows_of(recording.object_counts, numbers, objects)
+    files, sensor_counts = _rows_of(recording.sensor_counts, numbers, sensors)
+    return RecordingColumns(
+        name=recording.name,
+        map=recording.map,
+        frames=_some(recording.frames, numbers),
+        times_us=_some(recording.times_us, numbers),
+        params=_some(recording.params, numbers),
+        egos=recording.egos.take(numbers),
+        objects=recording.objects.take(own),
+        object_counts=object_counts,
+        sensor_counts=sensor_counts,
+        channels=_some(recording.channels, files),
+        paths=_some(recording.paths, files),
+        cameras=_some(recording.cameras, files) if recording.cameras else (),
+    )
+
+
+def _some(values: Any, rows: NDArray[np.int64]) -> Any:
+    """Those of some rows of a column; None where there is no column."""
+    if values is None or isinstance(values, np.ndarray):
+        return None if values is None else values[rows]
+    numbers: list[int] = rows.tolist()
+    return [values[number] for number in numbers]
+
+
+def _rows_of(
+    counts: NDArray[np.int64], numbers: NDArray[np.int64], stays: NDArray[np.bool_]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The rows of some labels that stay, and how many each of them has."""
+    ends = np.cumsum(counts)
+    rows = [np.arange(end - count, end) for end, count in zip(ends[numbers], counts[numbers], strict=True)]
+    rows = [own[stays[own]] for own in rows]
+    return np.concatenate([np.zeros(0, dtype=np.int64), *rows]), np.array([len(own) for own in rows], dtype=np.int64)
 
 
 def to_json(values: Mapping[str, Any]) -> str | None:

@@ -157,7 +157,7 @@ def _add_members(found: dict[int, str], members: MemberColumns, prefix: str) -> 
 def _add_texts(found: dict[int, str], column: str, texts: Sequence[str | None]) -> None:
     most = _LONGEST_NUMBER if is_json(column) else LONGEST_NAME
     # by far most are short; a JSON text of ours that is short has no number that is too long, either
-    if column not in TEXT_KEYS and max((len(text) for text in texts if text), default=0) <= most:
+    if column not in TEXT_KEYS and max(map(len, filter(None, texts)), default=0) <= most:
         return
     for row, text in enumerate(texts):
         if text is not None and (problem := _text_problem(column, text)):

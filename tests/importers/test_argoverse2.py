@@ -13,6 +13,7 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.feather
 import pytest
+from label_rows import labels_of
 
 from scenicq.errors import DataError
 from scenicq.geometry import angles
@@ -23,7 +24,7 @@ from scenicq.importers.ingest import ingest
 from scenicq.importers.report import Report
 from scenicq.store.classes import is_subclass
 from scenicq.store.dataset import open_dataset
-from scenicq.store.labels import Recording
+from scenicq.store.labels import Label
 
 SAMPLE = Path(__file__).parents[2] / "sample_data" / "argoverse2_tiny"
 REAL = Path(__file__).parents[3] / "shared" / "data" / "argoverse2"
@@ -36,10 +37,9 @@ def source(tmp_path: Path) -> Path:
     return Path(shutil.copytree(SAMPLE, tmp_path / "source"))
 
 
-def recordings(path: Path) -> list[Recording]:
+def recordings(path: Path) -> list[list[Label]]:
     report = Report()
-    found = Argoverse2().read(path, Options(), report).recordings(report)
-    return [recording for recording in found if isinstance(recording, Recording)]
+    return [labels_of(each) for each in Argoverse2().read(path, Options(), report).recordings(report)]
 
 
 def change(source: Path, name: str, edit: Callable[[list[dict[str, Any]]], object]) -> None:
@@ -94,14 +94,14 @@ def test_sensor_files(source: Path) -> None:
     (folder / "notes.jpg").touch()
     (recording,) = recordings(source)
     start = f"val/{LOG}/sensors"
-    assert [label.sensors["ring_front_center"][-23:-4] for label in recording.labels[:3]] == [
+    assert [label.sensors["ring_front_center"][-23:-4] for label in recording[:3]] == [
         "1699999999990000000",
         "1700000000111000000",
         "1700000000111000000",
     ]
-    assert recording.labels[1].sensors["lidar"] == f"{start}/lidar/1700000000100000000.feather"
+    assert recording[1].sensors["lidar"] == f"{start}/lidar/1700000000100000000.feather"
     (alone,) = recordings(source / "val" / LOG)
-    assert alone.labels[1].sensors["lidar"] == "sensors/lidar/1700000000100000000.feather"
+    assert alone[1].sensors["lidar"] == "sensors/lidar/1700000000100000000.feather"
 
 
 def test_without_a_map(source: Path, tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
+from label_rows import labels_of
 from shapely import box, unary_union
 
 from scenicq.geometry import angles
@@ -21,7 +22,6 @@ from scenicq.importers.ingest import ingest
 from scenicq.importers.interaction import Interaction
 from scenicq.importers.interchange import Interchange
 from scenicq.importers.kitti import Kitti
-from scenicq.importers.label_rows import labels_of
 from scenicq.importers.nuscenes import NuScenes
 from scenicq.importers.openlabel import OpenLabel
 from scenicq.importers.registry import importers
@@ -213,12 +213,7 @@ def case(request: pytest.FixtureRequest) -> Case:
 def read(case: Case) -> list[Recording]:
     report = Report()
     found = list(case.importer.read(case.path, Options(case.maps), report).recordings(report))
-    return [
-        recording
-        if isinstance(recording, Recording)
-        else Recording(recording.name, recording.map, tuple(labels_of(recording)))
-        for recording in found
-    ]
+    return [Recording(each.name, each.map, tuple(labels_of(each))) for each in found]
 
 
 def read_labels(case: Case) -> list[Label]:

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 from unittest.mock import patch
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from msgspec.json import Decoder
 
 from scenicq.errors import DataError
 from scenicq.importers import json_tables
-from scenicq.importers.json_tables import read_list
+from scenicq.importers.json_tables import ElementBlock, read_list
+
+ROWS = Decoder(list[dict[str, Any]])
 
 values = st.recursive(
     st.none() | st.booleans() | st.integers(-999, 999) | st.floats(allow_nan=False, allow_infinity=False) | st.text(),
@@ -24,7 +28,14 @@ objects = st.lists(st.dictionaries(st.text(), values, max_size=3), max_size=6)
 
 def elements(file: Path) -> list[tuple[object, int]]:
     """All elements with their lines."""
-    return [(value, block.line(number)) for block in read_list(file) for number, value in enumerate(block.elements)]
+    return [each for block in read_list(file, ROWS) for each in values_of(block)]
+
+
+def values_of(block: ElementBlock[dict[str, Any]]) -> list[tuple[object, int]]:
+    """The elements of a block with their lines; what is told of all of them at once is what is told of each."""
+    found = [json.loads(bytes(element)) for element in block.elements]
+    assert block.rows is None or repr(block.rows) == repr(found)
+    return [(value, block.line(number)) for number, value in enumerate(found)]
 
 
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -54,16 +65,16 @@ def test_cut_off_or_not_json(tmp_path: Path, content: bytes, place: int) -> None
     file = tmp_path / "list.json"
     file.write_bytes(content)
     with pytest.raises(DataError, match=f"list.json:{place} "):
-        list(read_list(file))
+        list(read_list(file, ROWS))
 
 
 def test_no_text_and_no_file(tmp_path: Path) -> None:
     (tmp_path / "list.json").write_bytes(b"[\xff]")
     with pytest.raises(DataError) as error:
-        list(read_list(tmp_path / "list.json"))
+        list(read_list(tmp_path / "list.json", ROWS))
     assert error.value.diagnostics[0].code == "file-invalid"
     with pytest.raises(DataError) as error:
-        list(read_list(tmp_path / "nowhere.json"))
+        list(read_list(tmp_path / "nowhere.json", ROWS))
     assert error.value.diagnostics[0].code == "file-missing"
 
 
@@ -71,8 +82,8 @@ def read_or_told(file: Path) -> tuple[list[tuple[object, int]], str]:
     """All elements before the first that is unsound, and what is said of that."""
     found: list[tuple[object, int]] = []
     try:
-        for block in read_list(file):
-            found += [(value, block.line(number)) for number, value in enumerate(block.elements)]
+        for block in read_list(file, ROWS):
+            found += values_of(block)
     except DataError as error:
         return found, error.diagnostics[0].message
     return found, ""
@@ -103,4 +114,4 @@ def test_at_once_is_as_one_by_one(
 def test_many_elements_are_read_at_once(tmp_path: Path) -> None:
     file = tmp_path / "list.json"
     file.write_text(json.dumps([{"a": n} for n in range(1000)], indent=0))
-    assert [len(block.elements) for block in read_list(file)] == [999, 1]
+    assert [len(block.elements) for block in read_list(file, ROWS)] == [999, 1]

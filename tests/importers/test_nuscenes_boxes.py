@@ -1,8 +1,9 @@
-"""Rows that msgspec decodes become what `json` and the reader of single rows make of them, or are left to these."""
+"""Annotations become what the page of the format says of what `json` reads; what is unsound is told."""
 
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -10,13 +11,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from label_rows import labels_of
 from msgspec import DecodeError
 
+from scenicq.geometry.angles import normalize
 from scenicq.importers.base import Options
-from scenicq.importers.fields import InvalidError, check_characters
-from scenicq.importers.label_rows import labels_of
+from scenicq.importers.fields import InvalidError
 from scenicq.importers.nuscenes import NuScenes
-from scenicq.importers.nuscenes_boxes import Boxes, BoxReader, of_rows
+from scenicq.importers.nuscenes_boxes import BoxReader
 from scenicq.importers.nuscenes_rows import ANNOTATIONS
 from scenicq.importers.report import Report
 from scenicq.store.columns import RecordingColumns, columns_of
@@ -46,6 +48,15 @@ PIECES = [
     '"size": 1, ',
 ]
 
+ROW = {
+    "token": "p",
+    "sample_token": "s0",
+    "instance_token": "t0",
+    "translation": [1, 2.5, 3],
+    "size": [1, 2, 3],
+    "rotation": [1, 0, 0, 0],
+}
+
 reals = st.floats(-1e6, 1e6) | st.integers(-1000, 1000)
 parts = st.floats(-0.9, 0.9)
 annotations = st.fixed_dictionaries(
@@ -66,55 +77,116 @@ annotations = st.fixed_dictionaries(
 )
 
 
-def by_row(rows: list[dict[str, Any]]) -> Boxes | None:
-    """The reference; None where a row is unsound."""
-    reader = BoxReader(*READER)
+def plain(row: Any) -> tuple[Any, ...] | None:
+    """What an annotation is by the page of the format, from what `json` makes of it; None where it is unsound."""
+    samples, tracks, attributes, visible = READER
+
+    def is_text(value: Any, *, empty: bool = False) -> bool:
+        return isinstance(value, str) and (empty or value != "") and not any("\ud800" <= c <= "\udfff" for c in value)
+
+    def is_whole(value: Any) -> bool:
+        return type(value) in (int, float) and float("-inf") < value < float("inf") and value == int(value)
+
+    def numbers(key: str, size: int) -> list[float]:
+        value = row.get(key)
+        if not isinstance(value, list) or len(value) != size or not {type(each) for each in value} <= {int, float}:
+            raise ValueError(key)
+        found = [float(each) for each in value]
+        if not all(map(math.isfinite, found)):
+            raise ValueError(key)
+        return found
+
     try:
-        return of_rows([reader.row(row["token"], row) for row in rows])
-    except InvalidError:
+        x, y, z = numbers("translation", 3)
+        w, *turn = numbers("rotation", 4)
+        size = numbers("size", 3)
+    except (AttributeError, OverflowError, ValueError):
         return None
-
-
-def columns(text: str) -> Boxes | None:
-    """What is made of the text of some rows at once; None where they are left to the reader of single rows."""
-    try:
-        return BoxReader(*READER).columns(ANNOTATIONS.decode(text))
-    except (DecodeError, RecursionError):
-        return None
-
-
-def same(one: Boxes, two: Boxes) -> bool:
-    return (list(one.tokens), one.attributes, one.samples.tolist(), one.tracks.tolist(), one.values.tobytes()) == (
-        *(list(two.tokens), two.attributes, two.samples.tolist(), two.tracks.tolist()),
-        np.ascontiguousarray(two.values).tobytes(),
+    norm = math.hypot(w, *turn)
+    tokens, level = row.get("attribute_tokens"), row.get("visibility_token")
+    counts = {key: row.get(key) for key in ("num_lidar_pts", "num_radar_pts") if row.get(key) is not None}
+    sound = (
+        is_text(row.get("token"))
+        and isinstance(row.get("sample_token"), str)
+        and row["sample_token"] in samples
+        and isinstance(row.get("instance_token"), str)
+        and row["instance_token"] in tracks
+        and 0.5 < norm < 2
+        and min(size) > 0
+        and (
+            tokens is None or (isinstance(tokens, list) and all(isinstance(t, str) and t in attributes for t in tokens))
+        )
+        and (level is None or is_text(level, empty=True))
+        and all(is_whole(count) and abs(count) < 2**63 for count in counts.values())
     )
+    if not sound:
+        return None
+    a, b, c, d = (each / norm for each in (w, *turn))
+    heading = normalize(math.atan2(2 * (a * d + b * c), 1 - 2 * (c * c + d * d)) - math.pi / 2)
+    told: dict[str, Any] = {}
+    for token in tokens or ():
+        group, _, value = attributes[token].rpartition(".")
+        told[group or "attribute"] = value
+    told |= {"visibility": visible.get(level, level)} if level else {}
+    told |= {key: int(count) for key, count in counts.items()}
+    values = (x, y, heading, *size, z)
+    return row["token"], samples[row["sample_token"]], tracks[row["instance_token"]], values, told
+
+
+def boxes(texts: list[str]) -> tuple[list[tuple[Any, ...]], int]:
+    """What becomes of the texts of some rows, and how many of them are told."""
+    rows, told = [], []
+    for text in texts:
+        try:
+            rows.append(ANNOTATIONS.decode(text.encode(errors="surrogatepass"), Report()))
+        except InvalidError as error:
+            told.append(str(error))
+    found = BoxReader(*READER).boxes(rows, lambda _, problem: told.append(problem))
+    attributes = [json.loads(each or "{}") for each in found.attributes]
+    parts = (found.tokens, found.samples.tolist(), found.tracks.tolist(), map(tuple, found.values.tolist()), attributes)
+    return list(zip(*parts, strict=True)), len(told)
+
+
+def agrees(texts: list[str]) -> None:
+    """All that is sound is read, all else is told; and rows that are decoded at once are what they are alone."""
+    expected = [made for text in texts if (made := plain(json.loads(text))) is not None]
+    found, told = boxes(texts)
+    assert repr(found) == repr(expected)
+    assert len(found) + told == len(texts)
+    try:
+        at_once = ANNOTATIONS.many.decode(f"[{','.join(texts)}]")
+    except DecodeError:
+        return
+    assert at_once == [ANNOTATIONS.decode(text.encode(), Report()) for text in texts]
 
 
 @settings(deadline=None)
 @given(rows=st.lists(annotations, min_size=1, max_size=5), indent=st.sampled_from([None, 0, 2]), ascii_=st.booleans())
-def test_sound_rows_are_read_alike(rows: list[dict[str, Any]], indent: int | None, ascii_: bool) -> None:
-    found, expected = columns(json.dumps(rows, indent=indent, ensure_ascii=ascii_)), by_row(rows)
-    assert expected is not None
-    assert found is not None
-    assert same(found, expected)
+def test_sound_rows_are_what_json_says(rows: list[dict[str, Any]], indent: int | None, ascii_: bool) -> None:
+    texts = [json.dumps(row, indent=indent, ensure_ascii=ascii_) for row in rows]
+    assert boxes(texts)[1] == 0
+    agrees(texts)
 
 
 @settings(deadline=None, max_examples=300)
 @given(rows=st.lists(annotations, min_size=1, max_size=3), data=st.data())
-def test_unsound_rows_are_left_to_the_other(rows: list[dict[str, Any]], data: st.DataObject) -> None:
+def test_unsound_rows_are_told(rows: list[dict[str, Any]], data: st.DataObject) -> None:
     row = data.draw(st.sampled_from(rows))
-    row[data.draw(st.sampled_from(sorted(row)))] = data.draw(st.sampled_from(JUNK))
-    agrees(json.dumps(rows))
+    row[data.draw(st.sampled_from([*sorted(row), "other"]))] = data.draw(st.sampled_from(JUNK))
+    agrees([json.dumps(row) for row in rows])
 
 
 @settings(deadline=None, max_examples=300)
-@given(rows=st.lists(annotations, min_size=1, max_size=3), data=st.data())
-def test_changed_texts_are_read_alike_or_left_to_the_other(rows: list[dict[str, Any]], data: st.DataObject) -> None:
-    text = json.dumps(rows, ensure_ascii=False)
+@given(row=annotations, data=st.data())
+def test_changed_texts_are_read_as_json_reads_them_or_told(row: dict[str, Any], data: st.DataObject) -> None:
+    text = json.dumps(row, ensure_ascii=False)
     for _ in range(data.draw(st.integers(1, 2))):
         at = data.draw(st.integers(0, len(text)))
         text = text[:at] + data.draw(st.sampled_from(PIECES)) + text[at + data.draw(st.integers(0, 2)) :]
-    agrees(text)
+    found, told = boxes([text])
+    assert len(found) + told == 1
+    if found:
+        assert repr(found) == repr([plain(json.loads(text))])
 
 
 @pytest.mark.parametrize(
@@ -128,43 +200,39 @@ def test_changed_texts_are_read_alike_or_left_to_the_other(rows: list[dict[str, 
         '"token": "q"',
         '"token": ""',
         '"token": "\\u0071\\ud83d\\ude00"',
-        '"token": "\\ud800"',
-        '"token": "\\udc00"',
-        '"unused": "\\ud800 and more"',
-        '"unused": "\x01"',
         '"unused": 1e999',
         '"unused": [1, {"a": [null, true]}]',
-        '"unused": tru',
-        '"unused": 01',
-        f'"unused": {"[" * 100_000}{"]" * 100_000}',
         '"num_lidar_pts": 9223372036854775807',
         '"num_lidar_pts": 9223372036854775808',
         '"num_lidar_pts": -9223372036854775808',
         '"num_lidar_pts": -0',
         '"num_lidar_pts": 1.0',
+        '"num_lidar_pts": 1.5',
         '"num_lidar_pts": true',
         '"visibility_token": ""',
         '"size": [0, 1, 1]',
         '"size": [5e-324, 1, 1]',
     ],
 )
-def test_a_field_that_comes_again_is_read_alike(field: str) -> None:
-    row = {"token": "p", "sample_token": "s0", "instance_token": "t0", "translation": [1, 2.5, 3], "size": [1, 2, 3]}
-    agrees(f"[{json.dumps(row | {'rotation': [1, 0, 0, 0]})[:-1]}, {field}}}]")
+def test_a_field_that_comes_again_counts(field: str) -> None:
+    agrees([f"{json.dumps(ROW)[:-1]}, {field}}}"])
 
 
-def agrees(text: str) -> None:
-    """Whatever is read at once is what single rows are."""
-    found = columns(text)
-    if found is not None:
-        rows = json.loads(text)
-        check_characters(rows)
-        expected = by_row(rows)
-        assert expected is not None
-        assert same(found, expected)
+@pytest.mark.parametrize(
+    "field",
+    [
+        '"token": "\\ud800"',
+        '"unused": "\\ud800 and more"',
+        '"unused": tru',
+        '"unused": 01',
+        f'"unused": {"[" * 100_000}{"]" * 100_000}',
+    ],
+)
+def test_what_no_file_can_hold_is_told(field: str) -> None:
+    assert boxes([f"{json.dumps(ROW)[:-1]}, {field}}}"]) == ([], 1)
 
 
-def tiny(folder: Path, table: str, change: Any) -> tuple[list[RecordingColumns | Recording], Report]:
+def tiny(folder: Path, table: str, change: Any) -> tuple[list[RecordingColumns], Report]:
     """The recordings of the sample data after a change of a table."""
     for file in (TINY / "v1.0-tiny").iterdir():
         rows = json.loads(file.read_bytes())
@@ -188,9 +256,7 @@ def test_a_bad_row_among_good_ones_is_named(tmp_path: Path) -> None:
     line = table.index(f'"token": "{row}",')
     expected = f"sample_annotation.json:{line}: annotation `{row}`: `rotation` is not a unit quaternion"
     assert [problem.message for problem in report.told if problem.what == "object"] == [expected]
-    counts = [
-        sum(len(one.objects.id) for one in found if isinstance(one, RecordingColumns)) for found in (before, after)
-    ]
+    counts = [sum(len(one.objects.id) for one in found) for found in (before, after)]
     assert counts[1] == counts[0] - 1
 
 
@@ -198,7 +264,6 @@ def test_labels_and_columns_agree(tmp_path: Path) -> None:
     folder = tmp_path / "v1.0-tiny"
     folder.mkdir()
     for found in tiny(folder, "", None)[0]:
-        assert isinstance(found, RecordingColumns)
         again = columns_of(Recording(found.name, found.map, tuple(labels_of(found))))
         assert (again.frames, again.params, again.objects.attributes) == (
             found.frames,
@@ -212,7 +277,7 @@ def test_an_annotation_that_is_there_twice_counts_once(tmp_path: Path) -> None:
     folder = tmp_path / "v1.0-tiny"
     folder.mkdir()
     found, report = tiny(folder, "sample_annotation", lambda rows: rows.append(rows[0]))
-    assert all(isinstance(one, Recording | RecordingColumns) for one in found)
+    assert sum(len(one.objects.id) for one in found) == 12
     assert [
         (problem.what, "is used twice" in problem.message) for problem in report.told if problem.what == "object"
     ] == [("object", True)]
@@ -227,8 +292,8 @@ def test_times_near_the_largest_number_have_no_wrong_velocity(tmp_path: Path) ->
             row["timestamp"] = 2**63 - 1 - number * 10_000_000 if number else 1 - 2**63
 
     found, _ = tiny(folder, "sample", change)
-    assert all(isinstance(one, RecordingColumns) and np.isnan(one.objects.vx).all() for one in found)
-    assert all(isinstance(one, RecordingColumns) and np.isnan(one.egos.vx).all() for one in found)
+    assert all(np.isnan(one.objects.vx).all() for one in found)
+    assert all(np.isnan(one.egos.vx).all() for one in found)
 
 
 @pytest.mark.parametrize("field", ["token", "sample_token"])

@@ -35,7 +35,7 @@ def test_every_importer_keeps_the_first_and_tells_of_the_others():
     report = Report()
     recording = Labels({STREET.name}, report).recording("r", [(LABEL, "source line 7")])
     assert recording is not None
-    assert [each.id for each in recording.labels[0].objects] == ["a", "c", "d", "e"]
+    assert list(recording.objects.id) == ["a", "c", "d", "e"]
     assert [each.message for each in report.told] == [
         f"source line 7: object `{id_}` of label `f`: has the track `t` of object `a`, which is kept"
         for id_ in ("b", "g")
@@ -48,7 +48,7 @@ def test_an_object_with_the_ego_s_track_is_left_out():
     label = replace(LABEL, ego=replace(LABEL.ego, track="u"))
     recording = Labels({STREET.name}, report).recording("r", [(label, "source line 7")])
     assert recording is not None
-    assert [each.id for each in recording.labels[0].objects] == ["a", "d", "e"]
+    assert list(recording.objects.id) == ["a", "d", "e"]
     assert "source line 7: object `c` of label `f`: has the track `u` of object `ego`, which is kept" in [
         each.message for each in report.told
     ]

@@ -27,7 +27,7 @@ from scenicq.importers.interchange import LineReader
 from scenicq.importers.report import Report
 from scenicq.importers.segments import Job, RecordingTask, World, write_segments
 from scenicq.processes import Workers
-from scenicq.store.columns import RecordingColumns
+from scenicq.store.columns import RecordingColumns, columns_of
 from scenicq.store.dataset import open_dataset
 from scenicq.store.labels import Recording
 from scenicq.store.manifest import MANIFEST
@@ -182,9 +182,9 @@ def test_a_recording_that_kills_is_named(tmp_path: Path) -> None:
 class Deadly:
     """A reader that ends its process."""
 
-    def recordings(self, labels: Labels, report: Report) -> Iterator[Recording]:
+    def recordings(self, labels: Labels, report: Report) -> Iterator[RecordingColumns]:
         os.kill(os.getpid(), signal.SIGKILL)
-        yield Recording("never", "", ())
+        yield columns_of(Recording("never", "", ()))
 
 
 @pytest.mark.slow
@@ -273,7 +273,7 @@ def test_an_update_reads_recordings_of_a_segment_that_are_new_or_have_changed(
     read: list[str] = []
     original = LineReader.recordings
 
-    def recordings(self: LineReader, labels: Labels, report: Report) -> Iterator[Recording | RecordingColumns]:
+    def recordings(self: LineReader, labels: Labels, report: Report) -> Iterator[RecordingColumns]:
         read.extend(self.lines.runs)
         yield from original(self, labels, report)
 

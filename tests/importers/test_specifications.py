@@ -14,14 +14,13 @@ from xml.etree import ElementTree
 
 import pytest
 from full_sources import FORMATS, LISTS, Document, drop, entries, full, parents
+from label_rows import labels_of
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.importers import opendrive, opendrive_worker
 from scenicq.importers.base import Options
-from scenicq.importers.label_rows import labels_of
 from scenicq.importers.registry import importers
 from scenicq.importers.report import Report
-from scenicq.store.columns import RecordingColumns
 
 INSTEAD = {"crs": {"properties": {"name": "EPSG:4326"}}, "junction/connection/@type": "virtual"}
 """What tells something only by its value."""
@@ -50,9 +49,7 @@ def take_in(format_: str, document: Document, folder: Path) -> tuple[str, str, M
             for name in source.maps
             for feature in source.maps[name]
         ]
-        recordings = [
-            labels_of(each) if isinstance(each, RecordingColumns) else each.labels for each in source.recordings(report)
-        ]
+        recordings = [labels_of(each) for each in source.recordings(report)]
         told = str((maps, recordings, source.name, source.facts))
     except DataError as error:
         told = str(error)

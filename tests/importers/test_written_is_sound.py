@@ -14,7 +14,6 @@ import pytest
 
 from scenicq.errors import DataError
 from scenicq.importers.ingest import ingest
-from scenicq.importers.interchange import Interchange, LineReader
 from scenicq.store.dataset import open_dataset
 from scenicq.store.verification import verify_computed
 
@@ -62,15 +61,11 @@ def spread(pairs: list[Any], rounds: Callable[[int], int]) -> list[Any]:
     return [pair for number, pair in enumerate(pairs) if number % share == number // len(JUNK) % share]
 
 
-@pytest.mark.parametrize("columnar", [True, False])
 @pytest.mark.parametrize("alone", [True, False])
 @pytest.mark.one_in(4)
 @pytest.mark.slow
-def test_every_field_of_a_label(tmp_path, monkeypatch, columnar, alone, rounds):
+def test_every_field_of_a_label(tmp_path, alone, rounds):
     """Each value in place of each field, in a recording of its own or beside sound labels."""
-    if not columnar:
-        monkeypatch.setattr(Interchange, "columnar", False)
-    assert "columnar" in LineReader.__slots__
     source = Path(shutil.copytree(SOURCE, tmp_path / "source"))
     first = with_everything(json.loads((source / "labels.jsonl").read_text().splitlines()[0]))
     lines = []
