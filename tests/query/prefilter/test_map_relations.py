@@ -241,7 +241,7 @@ def test_several_ask_for_one_element(tmp_path: Path, said: str):
 
 def test_sql_says_what_the_matcher_says(dataset: Dataset, rounds):
     seeds = (*range(rounds(32)), 27, 102, 164, 1306)
-    assert sum(check(dataset, seed) for seed in seeds) > 2 * len(seeds)
+    assert sum(check(dataset, seed) for seed in seeds) > len(seeds)
 
 
 @pytest.mark.slow
