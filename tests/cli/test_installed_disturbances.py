@@ -81,6 +81,7 @@ def test_rows_are_of_the_dataset_that_was_asked_about(way, how, command, crossro
     ("match", PROGRAM, "TOWN", "--export", "interchange", "out"),
 ], ids=lambda what: " ".join(map(str, what[:1])))  # fmt: skip
 @pytest.mark.one_in(6)
+@pytest.mark.slow
 def test_a_dataset_that_is_removed_meanwhile_is_told_in_one_diagnostic(what, command, crossroads, tmp_path):
     chance = random.Random(str(what[0]))
     for number in range(4):

@@ -235,6 +235,7 @@ def test_an_interrupted_match_without_a_file_says_what_can_be_resumed(command, c
 @pytest.mark.parametrize("jobs", ["1", "2"])
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
 @pytest.mark.one_in(6)
+@pytest.mark.slow
 def test_no_solver_outlives_a_command_that_ends(command, crossroads, scenarios, tmp_path, number, jobs):
     solver, beats = tmp_path / "solver.sh", tmp_path / "beats"
     solver.write_text(f"while :; do echo >> {beats}; sleep 0.05; done\n")

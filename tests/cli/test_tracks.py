@@ -52,6 +52,7 @@ def _dataset(folder, name_of):
     ],
 )
 @pytest.mark.one_in(8)
+@pytest.mark.slow
 def test_objects_that_are_named_anew_in_each_frame(run, tmp_path, words):
     texts = []
     for kind, name_of in (("same", {**dict.fromkeys(range(5), "t"), **dict.fromkeys(range(7, 12), "u")}.get),

@@ -24,6 +24,7 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the folders are
     ],
 )
 @pytest.mark.one_in(6)
+@pytest.mark.slow
 def test_the_state_lies_where_the_readme_says(more, kept, command, tmp_path):
     home = tmp_path / "home"
     home.mkdir()

@@ -10,7 +10,7 @@ from .scenes import compiled, refused
 
 @pytest.mark.timeout(60)
 @pytest.mark.parametrize("name", HOSTILE)
-@pytest.mark.one_in(8)
+@pytest.mark.one_in(16)
 def test_a_hostile_program_ends(name: str) -> None:
     assert refused(HOSTILE[name] + END)[0] == "budget-exceeded"
 

@@ -182,6 +182,7 @@ def test_unknown_frames_are_in_neither_group(street: Dataset, results: list[Resu
     assert found.matching + found.other == street.manifest.total.frames - 1
 
 
+@pytest.mark.slow
 def test_several_scenarios_are_corrected_together(
     street: Dataset, results: list[Result], predictions: Predictions
 ) -> None:

@@ -94,7 +94,7 @@ COMMANDS = ("match", "bare", "report", "check", "info", "show", "explain", "samp
 
 
 @pytest.mark.parametrize("what", COMMANDS)
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(12)
 def test_every_command_that_is_run_on_damage_does_its_work_without(what, run, crossroads, tmp_path):
     folder = tmp_path / "copy"
     shutil.copytree(crossroads, folder)

@@ -18,6 +18,7 @@ def test_the_next_run_comes_to_the_same_end(kind, after_s, run, crossroads, tmp_
     assert outcome_after(words, target, environment) == "mended"
 
 
+@pytest.mark.slow
 def test_every_command_that_is_killed_does_its_work_otherwise(run, crossroads, tmp_path):
     pieces = tmp_path / "shards"
     assert run("match", PROGRAM, crossroads, "--shard", "1/1", "-o", pieces).exit_code == 0

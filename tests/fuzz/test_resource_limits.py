@@ -42,7 +42,7 @@ def pieces(crossroads, tmp_path_factory):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="limits are those of Linux")
 @pytest.mark.parametrize(("kind", "limit", "most"), LIMITED_WRITERS)
-@pytest.mark.one_in(28)
+@pytest.mark.one_in(56)
 def test_what_runs_out_leaves_nothing_and_the_next_run_does_the_work(kind, limit, most, crossroads, pieces, tmp_path):
     shutil.copytree(crossroads, tmp_path / "copy")
     words, target = writers(tmp_path, crossroads, pieces)[kind]

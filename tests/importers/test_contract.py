@@ -224,7 +224,7 @@ def test_recognises_its_sample_and_nobody_else_does(case: Case) -> None:
     assert [name for name, importer in importers().items() if importer.recognises(case.path)] == [case.importer.name]
 
 
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(6)
 def test_counts(case: Case) -> None:
     labels = read_labels(case)
     objects = [member for label in labels for member in label.objects]
@@ -232,7 +232,7 @@ def test_counts(case: Case) -> None:
     assert (len(labels), len(objects), len(tracks)) == (case.frames, case.objects, case.tracks)
 
 
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(6)
 def test_identifiers_are_unique_and_recordings_sorted(case: Case) -> None:
     recordings = read(case)
     names = [recording.name for recording in recordings]
@@ -246,21 +246,21 @@ def test_identifiers_are_unique_and_recordings_sorted(case: Case) -> None:
             assert (label.recording, label.map, label.ego.id) == (recording.name, recording.map, "ego")
 
 
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(6)
 def test_time_increases_in_a_recording(case: Case) -> None:
     for recording in read(case):
         times = [label.timestamp_us for label in recording.labels]
         assert times == sorted(set(times))
 
 
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(6)
 def test_classes_are_known(case: Case) -> None:
     for label in read_labels(case):
         assert is_subclass(label.ego.category, "Car")
         assert all(is_class(member.category) and member.category != ROOT for member in label.objects)
 
 
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(6)
 def test_values_are_finite_metres_and_radians(case: Case) -> None:
     for label in read_labels(case):
         for member in (label.ego, *label.objects):
@@ -271,7 +271,7 @@ def test_values_are_finite_metres_and_radians(case: Case) -> None:
             assert member.velocity is None or math.hypot(*member.velocity) < 60
 
 
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(6)
 def test_length_is_along_the_heading(case: Case) -> None:
     vehicles = [
         member
@@ -299,7 +299,7 @@ def test_moving_vehicles_head_where_they_move(case: Case) -> None:
     assert sum(angle < math.radians(15) for angle in apart) >= 0.99 * len(apart)
 
 
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(6)
 def test_egos_lie_on_the_map(case: Case) -> None:
     source = case.importer.read(case.path, Options(case.maps), Report())
     area = {
@@ -312,7 +312,7 @@ def test_egos_lie_on_the_map(case: Case) -> None:
                 assert area[label.map].contains(box(label.ego.x, label.ego.y, label.ego.x + 0.1, label.ego.y + 0.1))
 
 
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(6)
 def test_store_round_trip(case: Case, tmp_path: Path) -> None:
     maps = [f"{name}={file}" for name, file in case.maps.items()]
     summary = ingest(case.path, tmp_path / "d", maps=maps)

@@ -21,7 +21,7 @@ SAMPLES = Path(__file__).parents[2] / "sample_data"
 
 @pytest.mark.skipif(sys.platform == "win32", reason="makes pipes and names that are no text")
 @pytest.mark.parametrize("name", FORMATS)
-@pytest.mark.one_in(8)
+@pytest.mark.one_in(16)
 def test_something_changed(tmp_path: Path, name: str) -> None:
     for seed in range(12):
         folder = tmp_path / str(seed)

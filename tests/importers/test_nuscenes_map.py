@@ -205,6 +205,7 @@ def test_forks_are_not_beside_each_other(tmp_path: Path) -> None:
         ("singapore-queenstown", True),
     ],
 )
+@pytest.mark.one_in(2)
 def test_the_side_of_traffic_is_that_of_the_city(tmp_path: Path, location: str, left_hand: bool) -> None:
     root = Path(shutil.copytree(TINY.parents[2], tmp_path / "nuscenes"))
     log = root / "v1.0-tiny" / "log.json"

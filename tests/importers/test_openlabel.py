@@ -82,7 +82,7 @@ def _random_pose(random: np.random.Generator) -> tuple[Matrix, dict[str, Any]]:
 
 
 @pytest.mark.parametrize("seed", range(40))
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(12)
 def test_trees_of_coordinate_systems(seed: int, tmp_path: Path) -> None:
     random = np.random.default_rng(seed)
     count = int(random.integers(2, 7))

@@ -20,7 +20,7 @@ TABLES = ("labels", "objects", "regions", "memberships", "sensors")
 
 @pytest.mark.parametrize("source", SOURCES, ids=lambda path: path.name)
 @pytest.mark.parametrize("ego", [None, "none"])
-@pytest.mark.one_in(8)
+@pytest.mark.one_in(16)
 def test_the_tables_are_the_same(source: Path, tmp_path: Path, ego: str | None) -> None:
     if not source.exists():
         pytest.skip(f"{source.name} is not on this machine")

@@ -175,6 +175,7 @@ def test_a_mistake_is_told_in_the_words_of_the_command(town, run, crossroads):
     assert run("match", "-e", "ego = new Caar", crossroads).stderr.strip() == str(caught.value)
 
 
+@pytest.mark.slow
 def test_a_script_needs_no_main_guard_for_several_processes(crossroads, tmp_path):
     script = tmp_path / "script.py"
     script.write_text(

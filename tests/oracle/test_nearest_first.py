@@ -182,6 +182,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, La
 
 @pytest.mark.parametrize("seed", range(2))
 @pytest.mark.one_in(2)
+@pytest.mark.slow
 def test_every_way_through_a_query_tells_the_same_first(folder, seed, tmp_path):
     dataset, labels = folder
     program = drawn_program(random.Random(100 + seed))

@@ -192,6 +192,7 @@ def test_frames_are_those_of_the_definition(drawn: Drawn, condition: str) -> Non
 
 @pytest.mark.parametrize("method", ["smt", "monolithic"])
 @pytest.mark.one_in(4)
+@pytest.mark.slow
 def test_every_method_says_the_same(drawn: Drawn, method: str) -> None:
     for condition in [*CONDITIONS][:4]:
         text = f"{HEAD}require {condition}\n"

@@ -292,7 +292,7 @@ def test_each_limit_is_reached_or_it_is_said_why_not():
     [pytest.param(*each, marks=[] if each[1] in FAST else [pytest.mark.slow]) for each in REACHED.items()],
 )
 @pytest.mark.timeout(300)
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(6)
 def test_a_limit_is_reached_and_changes_no_answer(compared, limit, name):
     assert compared.compare(name, at_least(limit), traced=True)
 

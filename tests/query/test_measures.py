@@ -185,6 +185,7 @@ def check(told: object, wanted: float | None, what: object) -> None:
 
 
 @pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.one_in(2)
 def test_measures_are_those_of_numpy(tmp_path, seed):
     draw, seen = random.Random(seed), Counter[str]()
     made = recordings(draw, 14)

@@ -139,6 +139,7 @@ COMMANDS = (("auto",), ("smt",), ("monolithic",), ("auto", "--no-prefilter"), ("
 @pytest.mark.parametrize("words", COMMANDS, ids=" ".join)
 @pytest.mark.parametrize("place", ["frames", *OVER_TIME])
 @pytest.mark.one_in(36)
+@pytest.mark.slow
 def test_the_installed_command_reads_what_is_observed(moving, still_unknown, place, words, command, tmp_path):
     form = "require ({0})" if place == "frames" else OVER_TIME[place]
 

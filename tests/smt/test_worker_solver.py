@@ -49,6 +49,7 @@ def test_failures_are_answers(solver: WorkerSolver, name: str, reason: str) -> N
 
 @pytest.mark.parametrize("name", ["hang", "spin"])
 @pytest.mark.one_in(4)
+@pytest.mark.slow
 def test_hanging_workers_are_killed_and_replaced(solver: WorkerSolver, name: str) -> None:
     assert _check(solver, name, timeout_s=0.2) == NoAnswer("timeout")
     assert _check(solver, "fine") == Unsat()

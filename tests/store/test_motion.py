@@ -214,6 +214,7 @@ def test_an_older_dataset_is_brought_up_to_date(tmp_path):
         assert manifest.read_text() == before
 
 
+@pytest.mark.slow
 def test_a_derived_speed_is_compared_and_read(tmp_path):
     write_dataset(tmp_path / "d", [recording([0, 0.5, 1.0], along([(0, 0), (0, 2), (0, 8)]))], {}, name="d")
     for lines, frames in {

@@ -26,6 +26,7 @@ def run(*arguments: bytes | str | Path, env: dict[str, str]) -> tuple[int, str]:
 
 
 @pytest.mark.parametrize(("name", "env"), [(b"n\xff", {}), ("ünï".encode(), ASCII)])
+@pytest.mark.one_in(2)
 def test_a_dataset_at_a_path_that_is_no_text(name: bytes, env: dict[str, str], tmp_path: Path) -> None:
     place = os.fsencode(tmp_path) + b"/" + name
     code, told = run("ingest", SOURCE, place, env=env)
@@ -51,6 +52,7 @@ def test_a_source_at_such_a_path_is_read(name: bytes, env: dict[str, str], tmp_p
 
 @pytest.mark.parametrize("form", ["jsonl", "csv", "parquet"])
 @pytest.mark.one_in(3)
+@pytest.mark.slow
 def test_results_name_a_program_at_such_a_path(form: str, tmp_path: Path) -> None:
     ingest(SOURCE, tmp_path / "d")
     program = os.fsencode(tmp_path) + b"/n\xff.scenic"

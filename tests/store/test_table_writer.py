@@ -41,6 +41,7 @@ def test_however_small_pieces_make_the_same_file_in_bounded_memory(table, crossr
 
 @pytest.mark.parametrize("table", SEGMENT_TABLES)
 @pytest.mark.one_in(8)
+@pytest.mark.slow
 def test_pieces_that_wait_take_as_much_memory_as_their_values(table, crossroads, tmp_path):
     some = first_rows(crossroads, table)
     rows = pa.concat_tables([some] * (ROWS // len(some) + 1)).combine_chunks()

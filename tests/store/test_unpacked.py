@@ -187,7 +187,7 @@ def results(folder: Path, rows: int) -> list[object]:
 @pytest.mark.skipif(sys.platform != "linux", reason="memory is counted as Linux does")
 @pytest.mark.parametrize("rows", [GIANT, pytest.param(100_000, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("source", [sensor_log, forecasting, packed_labels, results])
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(8)
 def test_what_a_file_takes_is_bounded_whatever_its_rows_become(
     source: Callable[[Path, int], list[object]], rows: int, command: str, tmp_path: Path
 ) -> None:

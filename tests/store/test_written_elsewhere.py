@@ -97,7 +97,7 @@ def words(name: str, out: object, town: Path) -> list[object]:
 
 @pytest.mark.parametrize("name", OUTPUTS)
 @pytest.mark.parametrize("bad_days", [0, 2])
-@pytest.mark.one_in(5)
+@pytest.mark.one_in(10)
 def test_the_bytes_are_those_that_are_written_here(
     name: str, bad_days: int, run: Any, crossroads: Path, bucket: Any, place: str, faults: Any, staged: Path,
     tmp_path: Path,
@@ -222,7 +222,7 @@ def test_what_cannot_be_written_is_told_before_the_work(
 
 @pytest.mark.parametrize("fault", ["503", "cut", "expired"])
 @pytest.mark.parametrize("name", ["lines", "shard", "interchange", "report", "dataset", "resumed", "scenes"])
-@pytest.mark.one_in(10)
+@pytest.mark.one_in(20)
 def test_each_file_has_its_turn_to_fail(
     name: str, fault: str, run: Any, crossroads: Path, bucket: Any, place: str, faults: Any, staged: Path, rounds: Any,
     monkeypatch: pytest.MonkeyPatch,

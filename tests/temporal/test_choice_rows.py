@@ -125,6 +125,7 @@ def test_a_point_of_which_the_start_says_nothing_is_one_for_all_that_follows(dat
     ids=" ".join,
 )  # fmt: skip
 @pytest.mark.one_in(140)
+@pytest.mark.slow
 def test_the_installed_command_says_so_by_every_method(dataset, tmp_path, text, frames, words):
     (tmp_path / "p.scenic").write_text(text)
     command = Path(sys.executable).with_name("scenicq")

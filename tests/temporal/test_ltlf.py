@@ -90,6 +90,7 @@ def test_unknown_is_what_completions_tell_apart():
     assert unknown > 500
 
 
+@pytest.mark.slow
 def test_what_more_samples_can_make_hold_may_hold():
     """Where one more sample makes it hold, however it is, it may; where none of many can, it rarely may."""
     draw = random.Random(9)

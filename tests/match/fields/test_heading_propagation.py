@@ -68,6 +68,7 @@ def solver(request):
 
 
 @pytest.mark.parametrize("method", ["auto", "smt"])
+@pytest.mark.one_in(2)
 def test_the_wrong_side_of_a_border_is_excluded_and_the_right_side_is_not(method, solver):
     # along the spot's line of sight the border can be crossed: the expected answer is found by walking it
     matcher = Matcher(compiled(PROGRAM, HAIRPIN), MatchOptions(tolerance=EXACT, method=method, timeout_s=20.0), solver)

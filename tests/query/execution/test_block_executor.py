@@ -39,6 +39,7 @@ def test_small_blocks_and_processes_give_the_same(dataset, jobs, monkeypatch):
 
 @pytest.mark.parametrize("pays", [True, False])
 @pytest.mark.one_in(2)
+@pytest.mark.slow
 def test_processes_are_started_once_it_is_clear_that_it_takes_long(dataset, pays, monkeypatch):
     monkeypatch.setattr("scenicq.query.prefilter.executor._FEWEST_FRAMES", 20)
     monkeypatch.setattr("scenicq.query.execution.block_executor.as_many_as_pay", lambda: 2)

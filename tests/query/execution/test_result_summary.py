@@ -338,7 +338,7 @@ def parked(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("limit", [3, 20])
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(8)
 def test_an_evaluation_counts_only_what_was_looked_at(
     run: Any, parked: Path, tmp_path: Path, form: str, limit: int
 ) -> None:

@@ -205,6 +205,7 @@ def test_the_command_advises_where_nothing_matches_and_when_asked(run, crossroad
 
 @pytest.mark.parametrize(("frames", "told"), [(1000, False), (1001, True)])
 @pytest.mark.one_in(2)
+@pytest.mark.slow
 def test_less_than_a_frame_in_a_thousand_is_hardly_any(frames, told, run, tmp_path):
     """One match in 1,000 frames is left alone; of one in 1,001 it is said what excludes the others."""
     ego = {"position": [0, 0], "heading": 0, "width": 2, "length": 4, "class": "Car"}

@@ -107,6 +107,7 @@ def test_from_the_command_line(run, crossroads, tmp_path):
     assert "near miss" in page
 
 
+@pytest.mark.slow
 def test_an_interval_that_is_too_short_says_which_duration_would_do(crossroads):
     program = "other = new Car ahead of ego by Range(3, 20)\n"
     options = replace(FOR_SECONDS, time=IntervalOptions(min_duration_s=20))

@@ -180,6 +180,7 @@ def test_something_may_be_meant_where_nothing_lies():
 @pytest.mark.parametrize("kind", ["lane", "laneGroup", "road", "intersection", "crossing", "laneSection"])
 @pytest.mark.parametrize("said", ["ego._{0} is other._{0}", "other._{0} is ego.{0}", "not (ego._{0} is other._{0})"])
 @pytest.mark.one_in(24)
+@pytest.mark.slow
 def test_the_same_element_may_be_none(dataset: Dataset, kind: str, said: str):
     text = f"{HEAD}other = new Car {ANY}\nrequire {said.format(kind)}\n"
     scenario = ready(compile_scenario(Source("p.scenic", text), STREET))
