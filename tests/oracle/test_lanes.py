@@ -35,8 +35,9 @@ from scenicq.temporal.interval_options import IntervalOptions
 STREET = street()
 AREAS = [(lane, lane.polygon, np.array(lane.centerline.lines[0].coords)) for lane in STREET.lanes]
 CROSSING = [lane for lane in STREET.lanes if lane.road is not None and lane.road.intersection is not None]
-CLEAR_M, CLEAR_RAD = 0.02, 1e-4
-"""How far places are from edges, and directions from 60 degrees off: rounding and tolerances are judged elsewhere."""
+CLEAR_M, CLEAR_RAD = 0.06, 1e-4
+"""How far places are from edges (beyond the map's own tolerance), and directions from 60 degrees off: rounding and
+tolerances are judged elsewhere."""
 
 
 def turn(a: float, b: float) -> float:
@@ -260,7 +261,7 @@ def test_frames_are_those_of_the_definition(tmp_path, rounds):
 
 @pytest.mark.slow
 def test_many_frames_are_those_of_the_definition(tmp_path):
-    for seed in range(2, 12):
+    for seed in range(2, 7):
         check_frames(tmp_path / f"{seed}", seed, 40, 80)
 
 
