@@ -261,8 +261,8 @@ def test_frames_are_those_of_the_definition(tmp_path, rounds):
 
 @pytest.mark.slow
 def test_many_frames_are_those_of_the_definition(tmp_path):
-    for seed in range(2, 7):
-        check_frames(tmp_path / f"{seed}", seed, 40, 80)
+    for seed in range(2, 5):
+        check_frames(tmp_path / f"{seed}", seed, 24, 80)
 
 
 # --- over time: at each sample the lanes that an object is in there
