@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import click
 
 from scenicq.errors import DataError, Diagnostic
-from scenicq.query.execution.pieces import finished, gather, partitions, write_piece
+from scenicq.query.execution.pieces import find_finished, gather, partitions, write_piece
 from scenicq.query.execution.question_notes import name_question, note_question
 from scenicq.query.execution.records import Record, record
 from scenicq.query.execution.result_origin import name_origin
@@ -64,7 +64,7 @@ def run_shard(query: Query, shard: Shard, folder: AnyPath, *, quiet: bool) -> tu
     if number > len(pieces):
         return Funnel(), None  # fewer recordings than shards: nothing is left for this one
     piece = pieces[number - 1]
-    if not finished(folder, question, [piece]):
+    if not find_finished(folder, question, [piece]):
         check_writable(folder)
         query.recordings = piece.recordings
         with ProgressBar(piece.frames, quiet=quiet) as bar:

@@ -116,11 +116,8 @@ def _average_precision(figures: Iterable[ClassFigures]) -> float:
 def _errors(category: str, figures: Iterable[ClassFigures], protocol: Protocol) -> dict[str, float]:
     """The errors of a class that mean something for it; the largest where nothing was found."""
     told = {name: value for each in figures for name, (value, _) in each.errors.items()}
-    silent = {
-        "orientation": protocol.no_orientation, "velocity": protocol.no_velocity, "attribute": protocol.no_attribute,
-    }  # fmt: skip
     return {
         name: told.get(name, most)
         for name, most in protocol.largest_errors.items()
-        if category not in silent.get(name, ())
+        if protocol.has_error(name, category)
     }

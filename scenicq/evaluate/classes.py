@@ -148,14 +148,9 @@ class _OneClass:
         means = mean_errors(score, found, errors[found], len(self._objects), clipped=self._clipped)
         told: dict[str, Figure] = {}
         for place, name in enumerate(ERRORS):
-            silent = {
-                "orientation": protocol.no_orientation,
-                "velocity": protocol.no_velocity,
-                "attribute": protocol.no_attribute,
-            }.get(name, frozenset[str]())
             values = errors[:, place]
             known = found & ~np.isnan(values)
-            if self._category in silent or not known.any() or (name == "velocity" and not protocol.velocity):
+            if not known.any() or not protocol.has_error(name, self._category):
                 continue
             sums, counts = self._binned(np.where(known, values, 0.0)), self._binned(known.astype(np.float64))
             many = resampled_errors(sums, counts, founds, objects, clipped=self._clipped)

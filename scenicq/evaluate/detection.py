@@ -6,7 +6,7 @@ import math
 from bisect import bisect_right
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,7 @@ __all__ = ["DISTANCES", "ERRORS_AT_M", "Detection", "FoundWithin", "Missing", "d
 Reals = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 Numbers = NDArray[np.int32]
+T = TypeVar("T", bound=np.generic)
 
 Missing = Literal["error", "empty", "skip"]
 """What a frame without predictions is: an error, a frame in which nothing was found, or left out."""
@@ -106,18 +107,18 @@ class Detection:
 
     def found_score(self, within: FoundWithin) -> Reals:
         """The score with which each label object was found within the distance of its class, -inf where it was not."""
-        found = self.score[within.usual]
-        for number, name in enumerate(self.classes):
-            if name in within.of_class:
-                found = np.where(self.object_class == number, self.score[within.of_class[name]], found)
-        return found
+        return self._by_class(within, self.score, self.object_class)
 
     def is_false(self, within: FoundWithin) -> Bools:
         """Whether each prediction is no label object within the distance of its class."""
-        found = self.owner[within.usual] < 0
+        return self._by_class(within, self.owner, self.prediction_class) < 0
+
+    def _by_class(self, within: FoundWithin, values: Mapping[float, NDArray[T]], numbers: Numbers) -> NDArray[T]:
+        """The values at the centre distance of each thing's class."""
+        found = values[within.usual]
         for number, name in enumerate(self.classes):
             if name in within.of_class:
-                found = np.where(self.prediction_class == number, self.owner[within.of_class[name]] < 0, found)
+                found = np.where(numbers == number, values[within.of_class[name]], found)
         return found
 
 

@@ -148,7 +148,7 @@ def write_sample(labels: Iterable[Label], network: Network, name: str, folder: A
     Args:
         labels: Drawn once it is clear that the folder can be written.
         network: The map.
-        name: Of the dataset.
+        name: The name of the dataset.
         folder: Here or elsewhere; nothing may be there.
 
     Raises:

@@ -20,7 +20,7 @@ from scenicq.importers.fields import NO_MAP, InvalidError, parse_json
 from scenicq.importers.folders import read_bytes
 from scenicq.importers.report import Report
 from scenicq.store.classes import ROOT, is_class
-from scenicq.store.columns import RecordingColumns, columns_of, taken
+from scenicq.store.columns import RecordingColumns, columns_of, take_labels
 from scenicq.store.labels import Label, Recording
 from scenicq.store.value_rules import Problems, find_problems
 
@@ -38,9 +38,6 @@ __all__ = [
     "read_class_map",
     "read_maps",
 ]
-
-_OF_EGO, _TWICE = "is kept for the ego", "is used twice"
-"""What is wrong with the id of an object."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,7 +183,7 @@ class Labels:
         """What `sound` makes of plain labels.
 
         Args:
-            name: Of the recording.
+            name: The name of the recording.
             labels: Each with its place in the source, for messages.
         """
         made = [label for label, _ in labels]
@@ -231,7 +228,7 @@ class Labels:
         as_it_is = order == list(range(len(found.frames)))
         if as_it_is and objects.all() and sensors.all():
             return found
-        return taken(found, order, objects, sensors)
+        return take_labels(found, order, objects, sensors)
 
     def _tell_missing(self, map_name: str, labels: int) -> None:
         if map_name == NO_MAP:
@@ -261,12 +258,9 @@ class Labels:
             names, known = set(ids[first:end]), [track for track in tracks[first:end] if track is not None]
             odd = len(names) < end - first or "ego" in names or len(set(known)) < len(known) or ego in known
             if odd or not problems.objects.keys().isdisjoint(range(first, end)):
-                for row, problem in _unsound(ids, tracks, range(first, end), ego, problems.objects):
+                for row, fact in _unsound(ids, tracks, range(first, end), owner, ego, problems.objects):
                     objects[row] = False
-                    told = f"object id `{ids[row]}` {owner} {problem}"
-                    if problem not in (_OF_EGO, _TWICE):
-                        told = f"object `{ids[row]}` {owner}: {problem}"
-                    self._report.left_out("object", "record-invalid", f"{places[label]}: {told}")
+                    self._report.left_out("object", "record-invalid", f"{places[label]}: {fact}")
             for row in range(files[label] - int(found.sensor_counts[label]), files[label]):
                 if (problem := problems.sensors.get(row)) is not None:
                     sensors[row] = False
@@ -276,19 +270,20 @@ class Labels:
 
 
 def _unsound(
-    ids: Sequence[str], tracks: Sequence[str | None], rows: range, ego: str | None, problems: Mapping[int, str]
-) -> Iterator[tuple[int, str]]:
+    ids: Sequence[str], tracks: Sequence[str | None], rows: range, owner: str, ego: str | None,
+    problems: Mapping[int, str],
+) -> Iterator[tuple[int, str]]:  # fmt: skip
     """The objects of a label that are left out, and why; of two with one id or one track the first is kept."""
     seen = {"ego"}
     owners: dict[str, str] = {} if ego is None else {ego: "ego"}
     for row in rows:
         id, track = ids[row], tracks[row]
         if id in seen:
-            yield row, _OF_EGO if id == "ego" else _TWICE
+            yield row, f"object id `{id}` {owner} {'is kept for the ego' if id == 'ego' else 'is used twice'}"
         elif row in problems:
-            yield row, problems[row]
+            yield row, f"object `{id}` {owner}: {problems[row]}"
         elif track is not None and track in owners:
-            yield row, f"has the track `{track}` of object `{owners[track]}`, which is kept"
+            yield row, f"object `{id}` {owner}: has the track `{track}` of object `{owners[track]}`, which is kept"
         else:
             seen.add(id)
             owners |= {} if track is None else {track: id}

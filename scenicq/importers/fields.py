@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Mapping
 from typing import Any, cast
 
@@ -24,8 +25,10 @@ __all__ = [
     "parse_json",
     "positive",
     "record",
+    "replace_non_finite",
     "text",
     "vector",
+    "whole",
 ]
 
 Record = Mapping[str, Any]
@@ -34,6 +37,7 @@ NO_MAP = "none"
 LONGEST_TEXT = LONGEST_NAME
 """Characters of a name."""
 _LARGEST = 2**63 - 1
+_TEXT_OR_NON_FINITE = re.compile(rb'("(?:[^"\\]|\\.)*")|NaN|-?Infinity')
 
 
 class InvalidError(ValueError):
@@ -55,6 +59,11 @@ def parse_json(content: bytes) -> object:
         raise InvalidError("not JSON: nested too deeply") from error
     except ValueError as error:
         raise InvalidError(f"not JSON: {error}") from error
+
+
+def replace_non_finite(content: bytes, by: bytes) -> bytes:
+    """A text with something else for NaN and infinities, which are no JSON but often written."""
+    return _TEXT_OR_NON_FINITE.sub(lambda found: found[1] or by, content)
 
 
 def check_characters(value: object) -> None:
@@ -114,13 +123,22 @@ def optional_text(fields: Record, key: str) -> str | None:
 def integer(fields: Record, key: str) -> int:
     """A whole number that 64 bits hold; 3.0 is one, too."""
     value = _present(fields, key)
-    if isinstance(value, float) and value.is_integer():
-        value = int(value)
-    if isinstance(value, bool) or not isinstance(value, int):
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise InvalidError(f"`{key}` is not a whole number but {_kind(value)}")
+    return whole(value, key)
+
+
+def whole(value: float, key: str) -> int:
+    """The whole number that a number is, if 64 bits hold it.
+
+    Raises:
+        InvalidError: It is none.
+    """
+    if isinstance(value, float) and not value.is_integer():
         raise InvalidError(f"`{key}` is not a whole number but {_kind(value)}")
     if abs(value) > _LARGEST:
         raise InvalidError(f"`{key}` is out of range")
-    return value
+    return int(value)
 
 
 def number(fields: Record, key: str) -> float:

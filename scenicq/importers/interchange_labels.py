@@ -17,7 +17,7 @@ from scenicq.importers import fields
 from scenicq.importers.base import ClassNames
 from scenicq.importers.cameras import camera_of
 from scenicq.importers.ego_choice import middle
-from scenicq.importers.fields import NO_MAP, InvalidError
+from scenicq.importers.fields import NO_MAP, InvalidError, whole
 from scenicq.importers.recording_checks import radians
 from scenicq.importers.report import Report
 from scenicq.importers.specification import specification
@@ -30,7 +30,6 @@ from scenicq.importers.typed_rows import (
     RowType,
     Words,
     plain_values,
-    whole,
 )
 from scenicq.store.columns import MemberColumns, RecordingColumns, to_json
 
@@ -137,7 +136,7 @@ class LabelLines:
     """The lines of one recording, each read as it comes.
 
     Attributes:
-        times_us, places, maps: Of each label that is sound in itself; `places` are those in the source.
+        times_us, places, maps: Those of the labels that are sound in themselves; places are in the source.
     """
 
     def __init__(self, recording: str, classes: ClassNames, angle: str, report: Report) -> None:

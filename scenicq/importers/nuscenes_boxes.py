@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cache
 from itertools import chain, starmap
 
@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.geometry.angles import normalize_array
-from scenicq.importers.fields import InvalidError
+from scenicq.importers.fields import InvalidError, whole
 from scenicq.importers.nuscenes_rows import Annotation
-from scenicq.importers.typed_rows import whole
-from scenicq.store.columns import to_json
+from scenicq.store.columns import pick_rows, to_json
 
 __all__ = ["BoxReader", "Boxes", "headings", "is_unit", "joined", "norms_of", "vectors"]
 
@@ -39,14 +38,7 @@ class Boxes:
 
     def take(self, order: NDArray[np.intp]) -> Boxes:
         """Those of some numbers, in their order."""
-        numbers: list[int] = order.tolist()
-        return Boxes(
-            [self.tokens[number] for number in numbers],
-            self.samples[order],
-            self.tracks[order],
-            self.values[order],
-            [self.attributes[number] for number in numbers],
-        )
+        return Boxes(**{each.name: pick_rows(getattr(self, each.name), order) for each in fields(self)})
 
 
 def joined(parts: Sequence[Boxes]) -> Boxes:

@@ -106,7 +106,7 @@ class Annotation(TableRow, kw_only=True, gc=False):
     """A row of `sample_annotation`.
 
     Attributes:
-        sample_token, instance_token: Of its sample and its instance.
+        sample_token, instance_token: The sample and the instance that it belongs to.
         translation: x, y, z in metres.
         size: Width, length, height in metres.
         rotation: Quaternion w, x, y, z.

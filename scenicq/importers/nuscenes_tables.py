@@ -19,13 +19,13 @@ from scenicq.importers import fields
 from scenicq.importers import nuscenes_rows as tables
 from scenicq.importers.cameras import Mount, Pose, posed
 from scenicq.importers.cameras import pose_of as vehicle_pose
-from scenicq.importers.fields import InvalidError
+from scenicq.importers.fields import InvalidError, whole
 from scenicq.importers.json_tables import ElementBlock, read_list
 from scenicq.importers.nuscenes_boxes import Boxes, BoxReader, headings, joined, norms_of, vectors
 from scenicq.importers.nuscenes_scenes import POSE_CHANNEL, Instant, SceneContent
 from scenicq.importers.recording_checks import tell_order
 from scenicq.importers.report import Report
-from scenicq.importers.typed_rows import ABSENT, RowError, RowType, whole
+from scenicq.importers.typed_rows import ABSENT, RowError, RowType
 
 __all__ = ["Tables"]
 
@@ -267,7 +267,8 @@ class Tables:
         rows, numbers = self._rows_of(tables.ANNOTATIONS, block, file, "object")
 
         def tell(number: int, problem: str) -> None:
-            message = f"{file}:{block.line(numbers[number])}: annotation `{rows[number].token}`: {problem}"
+            place = _Place(file, block, numbers[number])
+            message = f"{place}: annotation `{rows[number].token}`: {problem}"
             self._report.left_out("object", "record-invalid", message)
 
         return reader.boxes(rows, tell)
@@ -302,7 +303,7 @@ class Tables:
             except InvalidError as error:
                 name = f"{table.at} `{error.name}`: " if isinstance(error, RowError) and error.name else ""
                 name = name.replace("sample_annotation", "annotation")
-                self._report.left_out(what, "record-invalid", f"{file}:{block.line(number)}: {name}{error}")
+                self._report.left_out(what, "record-invalid", f"{_Place(file, block, number)}: {name}{error}")
         return rows, numbers
 
     def _try(self, what: str, place: _Place, make: Callable[[], V], name: str = "") -> V | None:

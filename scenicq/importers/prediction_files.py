@@ -7,7 +7,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from importlib import import_module
@@ -21,6 +20,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from scenicq.errors import DataError, Diagnostic
+from scenicq.importers.fields import replace_non_finite
 from scenicq.importers.prediction_checks import NEEDED, check_predictions, duplicate_error
 from scenicq.importers.predictions import ARGOVERSE2, NUSCENES, PLAIN, Predictions, Protocol
 from scenicq.store.schema import ArrowTable
@@ -42,7 +42,6 @@ _HINT = (
 )
 _NUMBERS = ("x", "y", "heading", "width", "length", "height", "vx", "vy", "score", "z")
 _MOST_ATTRIBUTES = 100
-_TEXT_OR_NO_NUMBER = re.compile(rb'("(?:[^"\\]|\\.)*")|NaN|-?Infinity')
 
 
 class _Detection(msgspec.Struct):
@@ -130,7 +129,7 @@ def _decoded(decoder: msgspec.json.Decoder[T], text: bytes) -> T:
     except msgspec.ValidationError:
         raise
     except msgspec.DecodeError:
-        plain = _TEXT_OR_NO_NUMBER.sub(lambda found: found[1] or b"null", text)
+        plain = replace_non_finite(text, b"null")
         if plain == text:
             raise
         return decoder.decode(plain)

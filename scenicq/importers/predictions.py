@@ -85,25 +85,35 @@ class Protocol:
     measure: str = ""
     largest_errors: Mapping[str, float] = field(default_factory=dict[str, float])
 
+    def has_error(self, name: str, category: str) -> bool:
+        """Whether an error, by its name, means something for a class."""
+        silent = {
+            "orientation": self.no_orientation, "velocity": self.no_velocity, "attribute": self.no_attribute,
+        }  # fmt: skip
+        return category not in silent.get(name, ()) and (name != "velocity" or self.velocity)
+
+
+_NUSCENES_CLASSES = {
+    "human.pedestrian.adult": "pedestrian",
+    "human.pedestrian.child": "pedestrian",
+    "human.pedestrian.construction_worker": "pedestrian",
+    "human.pedestrian.police_officer": "pedestrian",
+    "movable_object.barrier": "barrier",
+    "movable_object.trafficcone": "traffic_cone",
+    "vehicle.bicycle": "bicycle",
+    "vehicle.bus.bendy": "bus",
+    "vehicle.bus.rigid": "bus",
+    "vehicle.car": "car",
+    "vehicle.construction": "construction_vehicle",
+    "vehicle.motorcycle": "motorcycle",
+    "vehicle.trailer": "trailer",
+    "vehicle.truck": "truck",
+}
+"""The class that nuScenes evaluates for each class of its labels."""
 
 NUSCENES = Protocol(
     "nuscenes",
-    classes={
-        "human.pedestrian.adult": "pedestrian",
-        "human.pedestrian.child": "pedestrian",
-        "human.pedestrian.construction_worker": "pedestrian",
-        "human.pedestrian.police_officer": "pedestrian",
-        "movable_object.barrier": "barrier",
-        "movable_object.trafficcone": "traffic_cone",
-        "vehicle.bicycle": "bicycle",
-        "vehicle.bus.bendy": "bus",
-        "vehicle.bus.rigid": "bus",
-        "vehicle.car": "car",
-        "vehicle.construction": "construction_vehicle",
-        "vehicle.motorcycle": "motorcycle",
-        "vehicle.trailer": "trailer",
-        "vehicle.truck": "truck",
-    },
+    classes=_NUSCENES_CLASSES,
     ranges_m={"pedestrian": 40, "motorcycle": 40, "bicycle": 40, "traffic_cone": 30, "barrier": 30},
     range_m=50,
     points=("num_lidar_pts", "num_radar_pts"),
@@ -119,10 +129,7 @@ NUSCENES = Protocol(
         "cycle.with_rider", "cycle.without_rider", "pedestrian.moving", "pedestrian.sitting_lying_down",
         "pedestrian.standing", "vehicle.moving", "vehicle.parked", "vehicle.stopped",
     }),
-    scored=(
-        "barrier", "bicycle", "bus", "car", "construction_vehicle", "motorcycle", "pedestrian", "traffic_cone",
-        "trailer", "truck",
-    ),
+    scored=tuple(sorted(set(_NUSCENES_CLASSES.values()))),
     measure="NDS",
     largest_errors=dict.fromkeys(("translation", "scale", "orientation", "velocity", "attribute"), 1.0),
 )  # fmt: skip

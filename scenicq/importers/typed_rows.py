@@ -13,11 +13,11 @@ from typing import Annotated, Any, Generic, TypeAlias, TypeVar
 from msgspec import DecodeError, Meta, Raw, Struct, ValidationError, defstruct
 from msgspec.json import Decoder, decode
 
-from scenicq.importers.fields import LONGEST_TEXT, InvalidError, parse_json
+from scenicq.importers.fields import LONGEST_TEXT, InvalidError, parse_json, replace_non_finite
 from scenicq.importers.report import Report
 from scenicq.importers.specification import Specification
 
-__all__ = ["ABSENT", "FullText", "Length", "NoJsonError", "RowError", "RowType", "Words", "plain_values", "whole"]
+__all__ = ["ABSENT", "FullText", "Length", "NoJsonError", "RowError", "RowType", "Words", "plain_values"]
 
 T = TypeVar("T", bound=Struct)
 FullText: TypeAlias = Annotated[str, Meta(min_length=1, max_length=LONGEST_TEXT)]
@@ -27,8 +27,6 @@ Length: TypeAlias = Annotated[float, Meta(gt=0)]
 ABSENT = Raw(b"")
 """A field that is not there."""
 
-_LARGEST = 2**63 - 1
-_NO_NUMBER = re.compile(rb'("(?:[^"\\]|\\.)*")|NaN|-?Infinity')
 _MARK = b"\xef\xbb\xbf"
 """What some programs begin a text with."""
 _FIELDS = Decoder(dict[str, Raw])
@@ -140,19 +138,6 @@ def plain_values(values: Mapping[str, Raw] | None, key: str, on_problem: Callabl
     return sound
 
 
-def whole(value: float, key: str) -> int:
-    """A whole number that 64 bits hold; 3.0 is one, too.
-
-    Raises:
-        InvalidError: It is none.
-    """
-    if isinstance(value, float) and not value.is_integer():
-        raise InvalidError(f"`{key}` is not a whole number but a number")
-    if abs(value) > _LARGEST:
-        raise InvalidError(f"`{key}` is out of range")
-    return int(value)
-
-
 def _plain(text: bytes, error: Exception) -> bytes:
     """A text that msgspec takes for no JSON, written as JSON.
 
@@ -161,7 +146,7 @@ def _plain(text: bytes, error: Exception) -> bytes:
     """
     if isinstance(error, RecursionError):
         raise NoJsonError("not JSON: nested too deeply") from error
-    plain = _NO_NUMBER.sub(lambda found: found[1] or b"1e999", text.removeprefix(_MARK))
+    plain = replace_non_finite(text.removeprefix(_MARK), b"1e999")
     if plain != text:
         return plain
     try:

@@ -10,13 +10,13 @@ from scenicq.lint.terms import (
     ANGLE_PROPERTIES,
     ORDERS,
     Values,
-    compared,
+    compared_sides,
     is_angle,
+    make_warning,
     number,
     order_of,
     terms,
-    warning,
-    written,
+    text_of,
 )
 from scenicq.syntax import ast, phrases
 from scenicq.syntax.walk import walk
@@ -56,7 +56,7 @@ def _angles(node: ast.SyntaxNode, values: Values) -> Iterator[Diagnostic]:
         case ast.PropertyDefault(name=name) if name in ANGLE_PROPERTIES:
             places = [node.value]
         case ast.ComparisonChain():
-            sides = compared(node)
+            sides = compared_sides(node)
             if any(map(is_angle, sides)):
                 places = [side for side in sides if not is_angle(side)]
         case _:
@@ -66,7 +66,7 @@ def _angles(node: ast.SyntaxNode, values: Values) -> Iterator[Diagnostic]:
             value = number(term)
             if value is not None and abs(value) > _FULL_TURN and not ast.is_phrase(term, phrases.DEG):
                 text = term.span.text
-                yield warning(
+                yield make_warning(
                     "angle-without-deg", f"`{text}` is an angle of {abs(value) / math.tau:.1f} full turns", term.span,
                     "angles are in radians", f"write `{text} deg` for degrees",
                 )  # fmt: skip
@@ -84,7 +84,7 @@ def _facing_objects(nodes: list[ast.SyntaxNode]) -> Iterator[Diagnostic]:
     for node in nodes:
         match node:
             case ast.Phrase(row=phrases.FACING, operands=(ast.Name(id=name) as heading,)) if name in objects:
-                yield warning(
+                yield make_warning(
                     "facing-object", f"`facing {name}` is the direction in which `{name}` itself faces", heading.span,
                     "taken for its heading", f"`facing toward {name}` turns to it",
                     f"`facing {name}.heading` says that its heading is meant",
@@ -96,27 +96,27 @@ def _facing_objects(nodes: list[ast.SyntaxNode]) -> Iterator[Diagnostic]:
 def _signed(nodes: list[ast.SyntaxNode]) -> Iterator[Diagnostic]:
     """Angles that are bounded from above alone, by an amount: they may be as far to the right as they like."""
     pairs = [(node, *each) for node in nodes if isinstance(node, ast.ComparisonChain) for each in order_of(node)]
-    bounded_above = {written(low) for _, low, _ in pairs}
-    bounded_below = {written(high) for _, _, high in pairs}
+    bounded_above = {text_of(low) for _, low, _ in pairs}
+    bounded_below = {text_of(high) for _, _, high in pairs}
     for node, end, angle in pairs:
         least = number(end)
         if isinstance(angle, ast.Phrase) and is_angle(angle) and least is not None and _BACK < least < math.pi:
-            text = written(angle)
+            text = text_of(angle)
             if text not in bounded_above:
-                yield warning(
+                yield make_warning(
                     "angle-without-abs", f"`{text}` is negative to the right, down to -180 deg: half of what faces the "
                     "other way is left out", node.span, "bounds one side alone",
-                    f"`abs({text}) > {written(end)}` has both sides",
+                    f"`abs({text}) > {text_of(end)}` has both sides",
                 )  # fmt: skip
     for node, angle, end in pairs:
         most = number(end)
         if isinstance(angle, ast.Phrase) and is_angle(angle) and most is not None and 0 < most < math.pi:
-            text = written(angle)
+            text = text_of(angle)
             if text not in bounded_below:
-                yield warning(
+                yield make_warning(
                     "angle-without-abs", f"`{text}` is negative to the right, so every angle to the right is below "
-                    f"{written(end)}", node.span, "bounds one side alone",
-                    f"`abs({text}) < {written(end)}` bounds both sides",
+                    f"{text_of(end)}", node.span, "bounds one side alone",
+                    f"`abs({text}) < {text_of(end)}` bounds both sides",
                 )  # fmt: skip
 
 
@@ -127,10 +127,10 @@ def _sums(node: ast.SyntaxNode) -> Iterator[Diagnostic]:
             row=phrases.RELATION,
             operands=(ast.Attribute(name="heading") as one, ast.Attribute(name="heading") as other),
         ):
-            yield warning(
-                "angle-sum", f"`{written(node)}` is the sum of the two headings", node.span,
+            yield make_warning(
+                "angle-sum", f"`{text_of(node)}` is the sum of the two headings", node.span,
                 "adds a turn to a direction",
-                f"`relative heading of {written(one.value)} from {written(other.value)}` is their difference",
+                f"`relative heading of {text_of(one.value)} from {text_of(other.value)}` is their difference",
             )  # fmt: skip
         case _:
             pass
@@ -148,11 +148,11 @@ def _differences(node: ast.SyntaxNode) -> Iterator[Diagnostic]:
                 inner = side
         match inner:
             case ast.BinaryOp(operator="-", left=left, right=right) if _are_directions(left, right):
-                ends = (written(each.value if isinstance(each, ast.Attribute) else each) for each in (left, right))
+                ends = (text_of(each.value if isinstance(each, ast.Attribute) else each) for each in (left, right))
                 one, other = (f"({each})" if " " in each else each for each in ends)
-                yield warning(
+                yield make_warning(
                     "angle-difference",
-                    f"`{written(inner)}` is off by a full turn where the two lie on either side of south", inner.span,
+                    f"`{text_of(inner)}` is off by a full turn where the two lie on either side of south", inner.span,
                     "350 deg where -10 deg is meant",
                     f"`relative heading of {one} from {other}` lies within half a turn",
                 )  # fmt: skip
@@ -188,8 +188,8 @@ def _from_ego(nodes: list[ast.SyntaxNode]) -> Iterator[Diagnostic]:
     """What is measured from the ego, as nothing else is said, where another object must or may be meant."""
     for measure, name, word in filter(None, map(_left_out, nodes)):
         if name == "ego":
-            text = written(measure)
-            yield warning(
+            text = text_of(measure)
+            yield make_warning(
                 "measured-from-ego", f"`{text}` is measured {word} the ego, too: from itself to itself", measure.span,
                 "of the ego alone", f"`{text} {word} X` says {word} what; in a behavior, `self` is who behaves so",
             )  # fmt: skip
@@ -204,8 +204,8 @@ def _from_ego(nodes: list[ast.SyntaxNode]) -> Iterator[Diagnostic]:
         who = behaving.get(definition.name, {"ego"})
         for measure, name, word in filter(None, map(_left_out, walk(*definition.body))):
             if "ego" not in who and name in objects - who - {"ego"}:
-                text = written(measure)
-                yield warning(
+                text = text_of(measure)
+                yield make_warning(
                     "measured-from-ego", f"`{text}` is measured {word} the ego, whoever behaves so", measure.span,
                     f"not {word} `self`", f"write `{text} {word} self`",
                 )  # fmt: skip

@@ -12,8 +12,18 @@ from scenicq.syntax import ast, phrases
 from scenicq.syntax.walk import children, walk
 
 __all__ = [
-    "ANGLE_PROPERTIES", "ORDERS", "Values", "compared", "is_angle", "links", "number", "order_of", "set_once", "terms",
-    "warning", "written",
+    "ANGLE_PROPERTIES",
+    "ORDERS",
+    "Values",
+    "compared_sides",
+    "is_angle",
+    "links",
+    "make_warning",
+    "number",
+    "order_of",
+    "set_once",
+    "terms",
+    "text_of",
 ]  # fmt: skip
 
 ANGLE_PROPERTIES = frozenset({"heading", "yaw", "roadDeviation", "viewAngle", "parentOrientation"})
@@ -23,12 +33,12 @@ Values = Mapping[str, ast.SyntaxNode]
 """What stands for a name in all of a program; a parameter by `param` and its name."""
 
 
-def warning(code: str, message: str, span: Span, label: str, *hints: str) -> Diagnostic:
+def make_warning(code: str, message: str, span: Span, label: str, *hints: str) -> Diagnostic:
     """A warning at a place of the text."""
     return Diagnostic(code, message, span, label, hints=hints, severity="warning")
 
 
-def written(node: ast.SyntaxNode) -> str:
+def text_of(node: ast.SyntaxNode) -> str:
     """How a node is written, on one line."""
     return " ".join(node.span.text.split())
 
@@ -131,7 +141,7 @@ def links(chain: ast.ComparisonChain) -> Iterator[tuple[ast.SyntaxNode, str, ast
         yield left, link.operator, right
 
 
-def compared(chain: ast.ComparisonChain) -> list[ast.SyntaxNode]:
+def compared_sides(chain: ast.ComparisonChain) -> list[ast.SyntaxNode]:
     """The sides of a chain that are compared by order or equality."""
     return [chain.left, *(each.right for each in chain.comparisons if each.operator in _COMPARED)]
 

@@ -14,14 +14,14 @@ from scenicq.lint.terms import (
     ANGLE_PROPERTIES,
     ORDERS,
     Values,
-    compared,
+    compared_sides,
     is_angle,
     links,
+    make_warning,
     number,
     set_once,
     terms,
-    warning,
-    written,
+    text_of,
 )
 from scenicq.syntax import ast, phrases
 from scenicq.syntax.walk import walk
@@ -89,9 +89,9 @@ def _is_condition(node: ast.SyntaxNode) -> bool:
 def _alone(node: ast.SyntaxNode) -> Iterator[Diagnostic]:
     """Conditions that are a statement of their own."""
     if isinstance(node, ast.ExpressionStatement) and _is_condition(node.value):
-        yield warning(
+        yield make_warning(
             "condition-alone", "this condition asks nothing: no `require` stands before it", node.span,
-            "is worked out and forgotten", f"write `require {written(node)}`",
+            "is worked out and forgotten", f"write `require {text_of(node)}`",
         )  # fmt: skip
 
 
@@ -104,7 +104,7 @@ def _egos(body: tuple[ast.Statement, ...]) -> Iterator[Diagnostic]:
     ]  # fmt: skip
     for each in made[1:]:
         line = made[0].span.source.position(made[0].span.start)[0]
-        yield warning(
+        yield make_warning(
             "ego-twice", f"the ego of line {line} is an object of the scene, too", each.span, "is the ego from here on",
             "give one of the two another name",
         )  # fmt: skip
@@ -119,7 +119,7 @@ def _two(node: ast.SyntaxNode) -> Iterator[Diagnostic]:
                 if any(ast.is_phrase(each.value, phrases.DEG) for each in (first, second)):
                     return
                 one, other = (each.value.span.text for each in (first, second))
-                yield warning(
+                yield make_warning(
                     "choice-of-two", f"this is {one} or {other}, and nothing between", node.span, "one of two numbers",
                     f"`Range({one}, {other})` is all between them",
                 )  # fmt: skip
@@ -134,9 +134,9 @@ def _truths(node: ast.SyntaxNode) -> Iterator[Diagnostic]:
     for left, operator, right in links(node):
         side = next((each for each in (left, right) if isinstance(each, ast.ComparisonChain | ast.BoolOp)), None)
         if operator in ORDERS and side is not None:
-            whole = " ".join((written(left), operator, written(right)))
-            yield warning(
-                "truth-compared", f"`{written(side)}` is true or false, which are 1 and 0 as numbers", node.span,
+            whole = " ".join((text_of(left), operator, text_of(right)))
+            yield make_warning(
+                "truth-compared", f"`{text_of(side)}` is true or false, which are 1 and 0 as numbers", node.span,
                 "compares a truth value", f"`{whole}` without brackets compares all three"
                 if isinstance(side, ast.ComparisonChain) else "`and` and `or` join whole conditions",
             )  # fmt: skip
@@ -159,9 +159,9 @@ def _units(node: ast.SyntaxNode) -> Iterator[Diagnostic]:
     if unit is None or _SPEEDS_HERE.search(comment) or (said and said.isdisjoint(map(number, numbers))):
         return
     factor = _IN_METRES_A_SECOND.get(unit.group().lower(), " / 3.6")
-    yield warning(
-        "unit-in-comment", f"`{written(value)}` is taken as it is, whatever unit the comment names", value.span,
-        "speeds are in m/s", f"write `{written(value)}{factor}` for {unit.group()}",
+    yield make_warning(
+        "unit-in-comment", f"`{text_of(value)}` is taken as it is, whatever unit the comment names", value.span,
+        "speeds are in m/s", f"write `{text_of(value)}{factor}` for {unit.group()}",
     )  # fmt: skip
 
 
@@ -175,7 +175,7 @@ def _speeds(node: ast.SyntaxNode, values: Values) -> Iterator[Diagnostic]:
         case ast.WithSpecifier(property="speed"):
             places = [node.value]
         case ast.ComparisonChain():
-            sides = compared(node)
+            sides = compared_sides(node)
             if any(isinstance(side, ast.Attribute) and side.name == "speed" for side in sides):
                 places += sides
         case _:
@@ -185,13 +185,13 @@ def _speeds(node: ast.SyntaxNode, values: Values) -> Iterator[Diagnostic]:
         for value, term in found:
             text = term.span.text
             if value > _FASTEST_MPS:
-                yield warning(
+                yield make_warning(
                     "speed-beyond-roads", f"{text} m/s are {value * 3.6:.0f} km/h", term.span, "speeds are in m/s",
                     f"write `{text} / 3.6` for km/h",
                 )  # fmt: skip
         if any(value < 0 for value, _ in found):
-            yield warning(
-                "speed-negative", f"`{written(place)}` is below 0: a speed says how fast, not which way",
+            yield make_warning(
+                "speed-negative", f"`{text_of(place)}` is below 0: a speed says how fast, not which way",
                 place.span, "no speed is negative", "`facing 180 deg relative to roadDirection` goes against the road",
             )  # fmt: skip
 
@@ -205,8 +205,8 @@ def _unseen(nodes: list[ast.SyntaxNode]) -> Iterator[Diagnostic]:
     for node in nodes:
         match node:
             case ast.UnaryOp(operator="not", operand=ast.Phrase(row=phrases.CAN_SEE) as seen):
-                yield warning(
-                    "default-view", f"`{written(seen)}` asks whether it is within the view that its class has by "
+                yield make_warning(
+                    "default-view", f"`{text_of(seen)}` asks whether it is within the view that its class has by "
                     "default: nothing hides anything", node.span, "a matter of distance and direction",
                     "a requirement on the distance says it plainly",
                     "`with visibleDistance 30, with viewAngle 120 deg` sets a view",
@@ -239,7 +239,7 @@ def _exact(node: ast.SyntaxNode) -> Iterator[Diagnostic]:
         if number(asked) is not None:
             near = measured.span.text if number(asked) == 0 else f"({measured.span.text}) - {asked.span.text}"
             within = "5 deg" if is_angle(measured) else "0.5"
-            yield warning(
+            yield make_warning(
                 "exact-number", f"`==` asks for exactly {asked.span.text}, which what is measured hardly ever is",
                 node.span, "no tolerance holds in requirements",
                 f"`abs({near}) < {within}` asks for what is near it",
@@ -252,7 +252,7 @@ def _range(node: ast.SyntaxNode) -> Iterator[Diagnostic]:
             low, high = (number(argument.value) for argument in node.arguments[-2:])
             if low is not None and high is not None and low > high:
                 first, second = (argument.value.span.text for argument in node.arguments[-2:])
-                yield warning(
+                yield make_warning(
                     "range-reversed", f"this `{name}` ends before it starts", node.span,
                     "the lower end comes first", f"write `{second}, {first}`",
                 )  # fmt: skip
@@ -284,7 +284,7 @@ def _unused(nodes: list[ast.SyntaxNode]) -> Iterator[Diagnostic]:
             told.add(target.id)
             near = similar(target.id, read)
             hints = (f"`{near}` is read, and spelled nearly like it",) if near else ()
-            yield warning("unused-variable", f"nothing uses `{target.id}`", target.span, "set here", *hints)
+            yield make_warning("unused-variable", f"nothing uses `{target.id}`", target.span, "set here", *hints)
 
 
 @cache
@@ -307,4 +307,4 @@ def _unknown_properties(nodes: Iterable[ast.SyntaxNode]) -> Iterator[Diagnostic]
             hints = [f"`{near}` is spelled nearly like it"] if near else []
             hints.append("where it is an attribute of labels, `scenicq check SCENARIO DATASET` says so")
             message = f"no class has a property `{node.property}`, and nothing reads it"
-            yield warning("unknown-property", message, node.property_span, "set here", *hints)
+            yield make_warning("unknown-property", message, node.property_span, "set here", *hints)

@@ -20,8 +20,9 @@ __all__ = [
     "Memberships",
     "RecordingColumns",
     "columns_of",
+    "pick_rows",
     "second_of_track",
-    "taken",
+    "take_labels",
     "to_json",
 ]
 
@@ -62,7 +63,7 @@ class MemberColumns:
 
     def take(self, rows: NDArray[np.int64]) -> MemberColumns:
         """Those of some rows, in their order."""
-        return MemberColumns(**{each.name: _some(getattr(self, each.name), rows) for each in fields(self)})
+        return MemberColumns(**{each.name: pick_rows(getattr(self, each.name), rows) for each in fields(self)})
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -139,7 +140,7 @@ def second_of_track(recording: RecordingColumns) -> int | None:
     return None
 
 
-def taken(
+def take_labels(
     recording: RecordingColumns, labels: Sequence[int], objects: NDArray[np.bool_], sensors: NDArray[np.bool_]
 ) -> RecordingColumns:
     """Some labels of a recording, in another order.
@@ -156,21 +157,21 @@ def taken(
     return RecordingColumns(
         name=recording.name,
         map=recording.map,
-        frames=_some(recording.frames, numbers),
-        times_us=_some(recording.times_us, numbers),
-        params=_some(recording.params, numbers),
+        frames=pick_rows(recording.frames, numbers),
+        times_us=pick_rows(recording.times_us, numbers),
+        params=pick_rows(recording.params, numbers),
         egos=recording.egos.take(numbers),
         objects=recording.objects.take(own),
         object_counts=object_counts,
         sensor_counts=sensor_counts,
-        channels=_some(recording.channels, files),
-        paths=_some(recording.paths, files),
-        cameras=_some(recording.cameras, files) if recording.cameras else (),
+        channels=pick_rows(recording.channels, files),
+        paths=pick_rows(recording.paths, files),
+        cameras=pick_rows(recording.cameras, files) if recording.cameras else (),
     )
 
 
-def _some(values: Any, rows: NDArray[np.int64]) -> Any:
-    """Those of some rows of a column; None where there is no column."""
+def pick_rows(values: Any, rows: NDArray[np.intp]) -> Any:
+    """The values of some rows of a column, in their order; None where there is no column."""
     if values is None or isinstance(values, np.ndarray):
         return None if values is None else values[rows]
     numbers: list[int] = rows.tolist()

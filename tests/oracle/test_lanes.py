@@ -1,6 +1,6 @@
 """An object's own lanes by their definition, sharing no code: polygons of shapely and centrelines in NumPy.
 
-Of the lanes that contain an object, those whose direction there is within 60 degrees of its heading are its own; where
+The lanes of an object are those that contain it and whose direction there is within 60 degrees of its heading; where
 there is none, or no heading, all are. What is expected of a program is told by going through who plays whom and which
 of its lanes each object is in.
 """

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 from scenicq.errors import Source
 from scenicq.processes import Lost, Workers, as_many_as_pay
-from scenicq.query.execution.pieces import DatasetPiece, finished, gather, partitions, write_piece
+from scenicq.query.execution.pieces import DatasetPiece, find_finished, gather, partitions, write_piece
 from scenicq.query.execution.program_files import SiblingFiles
 from scenicq.query.execution.question_notes import name_question
 from scenicq.query.execution.records import read_record, record
@@ -155,7 +155,7 @@ def resumed(folder: AnyPath, executor: Executor) -> Executor:
     def run(query: Query, pieces: Iterable[DatasetPiece], progress: Progress) -> Generator[tuple[DatasetPiece, Done]]:
         question = name_question(query)
         every = tuple(pieces)
-        done = finished(folder, question, every)
+        done = find_finished(folder, question, every)
         progress(sum(piece.frames for piece in every if piece.number in done))
         missing = [piece for piece in every if piece.number not in done]
         with contextlib.closing(executor(query, missing, progress)) as running:

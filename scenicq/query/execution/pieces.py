@@ -30,7 +30,7 @@ from scenicq.store.atomic_files import made_folder, whole_file
 from scenicq.store.dataset import Dataset
 from scenicq.store.remote_path import AnyPath
 
-__all__ = ["DatasetPiece", "Gathered", "fingerprint", "finished", "gather", "partitions", "write_piece"]
+__all__ = ["DatasetPiece", "Gathered", "find_finished", "fingerprint", "gather", "partitions", "write_piece"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +99,7 @@ def _name(question: str, number: int, count: int) -> str:
     return f"{question}-{number:05}-of-{count:05}.jsonl"
 
 
-def finished(folder: AnyPath, question: str, pieces: Iterable[DatasetPiece]) -> frozenset[int]:
+def find_finished(folder: AnyPath, question: str, pieces: Iterable[DatasetPiece]) -> frozenset[int]:
     """The numbers of the pieces that are finished."""
     there = {path.name for path in _files(folder)}
     return frozenset(each.number for each in pieces if _name(question, each.number, each.count) in there)

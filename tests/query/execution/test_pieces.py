@@ -12,7 +12,7 @@ from scenicq.importers.ingest import ingest
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import EXACT, parse_tolerance
 from scenicq.query.execution.executors import here, resumed
-from scenicq.query.execution.pieces import DatasetPiece, fingerprint, finished, gather, partitions, write_piece
+from scenicq.query.execution.pieces import DatasetPiece, find_finished, fingerprint, gather, partitions, write_piece
 from scenicq.query.execution.program_files import read_program
 from scenicq.query.execution.records import FrameRecord, record
 from scenicq.query.execution.run import Query, QueryOptions
@@ -74,7 +74,7 @@ def test_a_missing_piece_is_named(dataset, tmp_path):
     with pytest.raises(DataError, match="1 of 3 pieces are missing: 2"):
         gather(tmp_path)
     question = fingerprint(dataset, read_program(PROGRAM).text, OPTIONS)
-    assert finished(tmp_path, question, pieces) == {0, 2}
+    assert find_finished(tmp_path, question, pieces) == {0, 2}
 
 
 def test_a_truncated_piece_is_refused(dataset, tmp_path):
