@@ -77,7 +77,7 @@ def _absent(value: Value) -> tuple[str, ...] | None:
     match value:
         case PolygonSet() | PolylineSet():
             # `road` is the area that one can drive on
-            return None if value.pieces else ("road" if value.name == "drivable" else value.name,)
+            return None if not value.is_empty else ("road" if value.name == "drivable" else value.name,)
         case Undefined():
             return ()
         case _:

@@ -303,7 +303,7 @@ class _Motion:
     def near_junction(self, distance: float) -> Node | None:
         """The centre is in a junction, or so many metres before one; None where the map has none."""
         junctions = self.run.network.intersectionRegion
-        return self.within(junctions, distance) if junctions.polygons else None
+        return None if junctions.is_empty else self.within(junctions, distance)
 
     def turned_from(self, heading: Node, *directions: Node) -> Node:
         """One of some directions differs from a heading by less than the bound."""

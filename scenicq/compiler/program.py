@@ -107,7 +107,7 @@ def _compiled(
 ) -> Scenario:
     module = parse(source, version)
     chosen = decide_version(module)
-    world = Modules(network, chosen, initial, loader, map_defaults=map_defaults and bool(network.features))
+    world = Modules(network, chosen, initial, loader, map_defaults=map_defaults and bool(network.kinds))
     run = world.interpreter
     run.timed, run.gap_s, run.lanes = timed, gap_s, lanes
     try:
@@ -116,7 +116,7 @@ def _compiled(
         scope = Environment({}, Environment(names, world.base, library=True), user=True)
         run.run(module.body, scope)
         warnings = _borrowed(module, scope, names, library) if model is None else ()
-        if map_defaults and not network.features:
+        if map_defaults and not network.kinds:
             warnings += _anywhere(run.objects)
         return _scenario(run, module, chosen, network, warnings)
     except RecursionError:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 
@@ -11,13 +11,18 @@ from scenicq.geometry.features import MapFeature
 from scenicq.geometry.road_direction import DirectedLane, RoadDirection
 from scenicq.geometry.shapes import Coordinates
 
-__all__ = ["centerlines", "direction_along", "lane_direction", "road_direction"]
+__all__ = ["centerlines", "direction_along", "has_centerline", "lane_direction", "road_direction"]
 
 
 def centerlines(feature: MapFeature) -> tuple[Coordinates, ...]:
     """The polylines of a feature's centreline, in the direction of travel, shape (n, 2) each."""
     lines = cast("list[list[list[float]]]", feature.properties.get("centerline") or [])
     return tuple(np.array(line, dtype=float)[:, :2] for line in lines if len(line) > 1)
+
+
+def has_centerline(feature: MapFeature) -> bool:
+    """Whether the map gives a feature a centreline."""
+    return any(len(line) > 1 for line in cast("list[list[Any]]", feature.properties.get("centerline") or []))
 
 
 def lane_direction(features: Iterable[MapFeature]) -> RoadDirection:

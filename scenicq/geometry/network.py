@@ -9,8 +9,8 @@ features, the same values that the store keeps.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from functools import cached_property
+from collections.abc import Callable, Iterable, Sequence
+from functools import cached_property, partial
 from typing import TypeVar, cast
 
 from shapely import STRtree
@@ -35,9 +35,11 @@ from scenicq.geometry.elements import (
 from scenicq.geometry.features import MapFeature, dangling, read_geojson, region_name
 from scenicq.geometry.fields import VectorField
 from scenicq.geometry.followed_direction import FollowedDirection
+from scenicq.geometry.map_area import MapArea
+from scenicq.geometry.map_traits import MapTraits
 from scenicq.geometry.network_builder import Elements, link
 from scenicq.geometry.regions import SLACK, DeferredPolylines, PolygonSet, PolylineSet, Region
-from scenicq.geometry.road_direction import RoadDirection, along_lines
+from scenicq.geometry.road_direction import DeferredDirection, RoadDirection, along_lines
 from scenicq.geometry.shapes import Shape
 
 __all__ = ["TOLERANCE", "MapFeature", "Network", "read_geojson"]
@@ -51,36 +53,80 @@ TOLERANCE = 0.05
 class Network:
     """A map's elements, regions and direction of traffic.
 
+    Elements are read when something asks for more than which kinds of them the map has.
+
     Attributes:
         name: The map's name.
-        features: What it is built from.
     """
 
-    def __init__(self, name: str, features: Iterable[MapFeature]) -> None:
-        """Take the features, but for those with an id that is already taken; all else is made when it is asked for."""
+    def __init__(
+        self,
+        name: str,
+        features: Iterable[MapFeature] | Callable[[], Iterable[MapFeature]],
+        traits: MapTraits | None = None,
+    ) -> None:
+        """Take the features, but for those with an id that is already taken; all else is made when it is asked for.
+
+        Args:
+            name: The map's name.
+            features: What it is built from, or what reads that.
+            traits: What is known of the features before they are read; None for nothing.
+        """
+        self.name = name
+        self._source = features if callable(features) else partial(tuple[MapFeature, ...], features)
+        self._traits = traits
+        if not callable(features):
+            _ = self._kept
+
+    @cached_property
+    def _kept(self) -> tuple[dict[str, MapFeature], list[str]]:
+        """The features by id, and what is said of the others."""
         kept: dict[str, MapFeature] = {}
-        self._repeated: list[str] = []
-        for feature in features:
+        repeated: list[str] = []
+        for feature in self._source():
             if feature.id in kept:
-                self._repeated.append(f"{feature.kind} `{feature.id}`: the id is used before")
+                repeated.append(f"{feature.kind} `{feature.id}`: the id is used before")
             else:
                 kept[feature.id] = feature
-        self.name = name
-        self.features = tuple(kept.values())
+        return kept, repeated
+
+    @cached_property
+    def features(self) -> tuple[MapFeature, ...]:
+        """What it is built from."""
+        return tuple(self._kept[0].values())
+
+    @property
+    def is_read(self) -> bool:
+        """Whether anything has asked for more than the map's traits."""
+        return "_kept" in vars(self)
+
+    @cached_property
+    def kinds(self) -> frozenset[str]:
+        """The kinds of elements that the map has."""
+        known = self._traits
+        return frozenset(feature.kind for feature in self.features) if known is None else known.kinds
 
     @cached_property
     def problems(self) -> tuple[str, ...]:
         """Repeated ids (left out) and dangling references (passed over), as facts for the user."""
-        return (*self._repeated, *(message for _, message in dangling(self.features)))
+        return (*self._kept[1], *(message for _, message in dangling(self.features)))
 
     @cached_property
     def roadDirection(self) -> RoadDirection:
         """The direction of traffic, where lanes overlap that of ways through intersections first, as Scenic has it."""
         # elements are linked when a direction is asked for: many a program never does
-        return road_direction(self.features, self._ways)
+        nowhere = None if self._traits is None else not self._traits.directed
+        return DeferredDirection(
+            "roadDirection",
+            lambda: road_direction(self.features, self._ways),
+            nowhere=nowhere,
+            has_beside="shoulder" in self.kinds,
+        )
 
     def _ways(self) -> list[str]:
         """The lanes through intersections, in the order of their maneuvers."""
+        if "intersection" not in self.kinds:
+            return []
         ways = (each.connectingLane for crossing in self.intersections for each in crossing.maneuvers)
         return [lane.id for lane in ways if lane is not None]
 
@@ -214,35 +260,36 @@ class Network:
     @cached_property
     def laneRegion(self) -> PolygonSet:
         """All lanes."""
-        return self._region("lane", ("lane",), self.roadDirection)
+        return self._region("lane", ("lane",), lambda: self.roadDirection)
 
     @cached_property
     def roadRegion(self) -> PolygonSet:
         """The roads outside of intersections."""
+        return MapArea("road", self._roads, lambda: self.roadDirection, None if "road" in self.kinds else True)
+
+    def _roads(self) -> PolygonSet:
         inside = {road.id for road in self.connectingRoads}
-        found = [feature for feature in self.features if feature.kind == "road" and feature.id not in inside]
-        return _region_of(found, "road", self.roadDirection)
+        return _region_of([each for each in self.features if each.kind == "road" and each.id not in inside], "road")
 
     @cached_property
     def intersectionRegion(self) -> PolygonSet:
         """All intersections."""
-        return self._region("intersection", ("intersection",), self.roadDirection)
+        return self._region("intersection", ("intersection",), lambda: self.roadDirection)
 
     @cached_property
     def crossingRegion(self) -> PolygonSet:
         """All pedestrian crossings."""
-        return self._region("crossing", ("crossing",), None)
+        return self._region("crossing", ("crossing",))
 
     @cached_property
     def sidewalkRegion(self) -> PolygonSet:
         """All sidewalks."""
-        return self._region("sidewalk", ("sidewalk",), direction_along(self.features, "sidewalk"))
+        return self._region("sidewalk", ("sidewalk",), lambda: self._along("sidewalk"))
 
     @cached_property
     def shoulderRegion(self) -> PolygonSet:
         """All shoulders."""
-        along = direction_along(self.features, "shoulder")
-        return self._region("shoulder", ("shoulder",), along or self.roadDirection)
+        return self._region("shoulder", ("shoulder",), lambda: self._along("shoulder") or self.roadDirection)
 
     @cached_property
     def curbRegion(self) -> PolylineSet:
@@ -261,31 +308,33 @@ class Network:
     @cached_property
     def drivableRegion(self) -> PolygonSet:
         """Lanes, roads, intersections and what the map calls drivable."""
-        return self._region("drivable", ("lane", "road", "intersection", "drivable"), self.roadDirection)
+        return self._region("drivable", ("lane", "road", "intersection", "drivable"), lambda: self.roadDirection)
 
     @cached_property
     def walkableRegion(self) -> PolygonSet:
         """Sidewalks and crossings."""
-        along = None if self.region("crossing") else self.sidewalkRegion.orientation
-        return self._region("walkable", ("sidewalk", "crossing"), along)
+        return self._region(
+            "walkable",
+            ("sidewalk", "crossing"),
+            lambda: None if "crossing" in self.kinds else self.sidewalkRegion.orientation,
+        )
 
     @cached_property
     def otherRegions(self) -> dict[str, PolygonSet]:
         """The regions of kinds of elements that Scenic does not know, by name: `carparkAreaRegion`."""
         kinds: dict[str, tuple[str, ...]] = {}
-        for kind in sorted({feature.kind for feature in self.features}):
+        for kind in sorted(self.kinds):
             if (name := region_name(kind)) is not None:
                 kinds[name] = *kinds.get(name, ()), kind
-        return {name: self._region(" or ".join(found), found, None) for name, found in kinds.items()}
+        return {name: self._region(" or ".join(found), found) for name, found in kinds.items()}
 
     def region(self, kind: str) -> Region | None:
         """The region of all features of a kind, or None if the map has none."""
-        found = [feature for feature in self.features if feature.kind == kind]
-        if not found:
+        if kind not in self.kinds:
             return None
         named: dict[str, str] = {name: f"{name}Region" for name in ("lane", "road", "intersection", "crossing")}
         named |= {name: f"{name}Region" for name in ("sidewalk", "shoulder", "curb")}
-        return cast(Region, getattr(self, named[kind])) if kind in named else self._region(kind, (kind,), None)
+        return cast(Region, getattr(self, named[kind])) if kind in named else self._region(kind, (kind,))
 
     # --- what lies at a point
 
@@ -370,13 +419,22 @@ class Network:
             self._indices[kind] = PolygonSet(tuple(cast(Polygon, p) for p, _ in parts), kind), [i for _, i in parts]
         return self._indices[kind]
 
-    def _region(self, name: str, kinds: tuple[str, ...], orientation: VectorField | None) -> PolygonSet:
-        return _region_of([feature for feature in self.features if feature.kind in kinds], name, orientation)
+    def _along(self, kind: str) -> RoadDirection | None:
+        """The direction of the centrelines of all elements of a kind, if the map gives them."""
+        return direction_along(self.features, kind) if kind in self.kinds else None
+
+    def _region(
+        self, name: str, kinds: tuple[str, ...], orientation: Callable[[], VectorField | None] = lambda: None
+    ) -> PolygonSet:
+        def make() -> PolygonSet:
+            return _region_of([feature for feature in self.features if feature.kind in kinds], name)
+
+        return MapArea(name, make, orientation, self.kinds.isdisjoint(kinds))
 
 
-def _region_of(features: Sequence[MapFeature], name: str, orientation: VectorField | None) -> PolygonSet:
+def _region_of(features: Sequence[MapFeature], name: str) -> PolygonSet:
     polygons = tuple(cast("Polygon | MultiPolygon", feature.shape) for feature in features)
-    return PolygonSet(polygons, name, orientation, tuple(feature.id for feature in features))
+    return PolygonSet(polygons, name, None, tuple(feature.id for feature in features))
 
 
 def _first_within(elements: Sequence[_Element], x: float, y: float) -> _Element | None:

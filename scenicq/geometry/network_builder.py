@@ -7,12 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, TypeVar, cast
 
 from shapely.geometry import LineString, MultiPolygon, Polygon
 
 from scenicq.geometry import shapes
-from scenicq.geometry.centerlines import centerlines
+from scenicq.geometry.centerlines import centerlines, has_centerline
 from scenicq.geometry.element_ends import derive_ends
 from scenicq.geometry.element_lines import (
     given_line,
@@ -40,7 +41,7 @@ from scenicq.geometry.elements import (
 from scenicq.geometry.features import MapFeature, names
 from scenicq.geometry.maneuvers import by_heading, maneuvers_of
 from scenicq.geometry.own_directions import along_centerline, direction_of_intersection, direction_of_lanes
-from scenicq.geometry.regions import PolylineSet
+from scenicq.geometry.regions import DeferredPolylines, PolylineSet
 
 __all__ = ["Elements", "link"]
 
@@ -130,12 +131,16 @@ def _make(feature: MapFeature, elements: Elements) -> None:
 def _along(element: _Long, feature: MapFeature) -> _Long:
     """An element with the lines that the map gives, and the direction that its centreline has."""
     element.left_edge, element.right_edge = given_line(feature, "left_edge"), given_line(feature, "right_edge")
-    lines = centerlines(feature)
-    if lines:
-        element.orientation = along_centerline(feature.id, feature.shape, lines)
-        name = f"centerline of {feature.id}"
-        element.centerline = PolylineSet(tuple(LineString(line) for line in lines), name, element.orientation)
+    if has_centerline(feature):
+        element.orientation = along_centerline(feature.id, feature.shape, partial(centerlines, feature))
+        element.centerline = DeferredPolylines(
+            f"centerline of {feature.id}", partial(_centerline, feature), element.orientation
+        )
     return element
+
+
+def _centerline(feature: MapFeature) -> PolylineSet:
+    return PolylineSet(tuple(LineString(line) for line in centerlines(feature)), "")
 
 
 def _signals(feature: MapFeature) -> tuple[Signal, ...]:

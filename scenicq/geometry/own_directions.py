@@ -7,11 +7,11 @@ Scenic has the same, but takes the first of several lanes that hold a point, whe
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 from scenicq.geometry.elements import Intersection, Lane, LaneGroup, LaneSection, Road, RoadSection
 from scenicq.geometry.regions import PolylineSet
-from scenicq.geometry.road_direction import DirectedLane, RoadDirection
+from scenicq.geometry.road_direction import DeferredDirection, DirectedLane, RoadDirection
 from scenicq.geometry.shapes import Coordinates, Shape
 
 __all__ = ["along_centerline", "direction_of_intersection", "direction_of_lanes"]
@@ -22,16 +22,19 @@ _BESIDE = 0.05
 """Metres beside a lane that count as in it where no lane is."""
 
 
-def along_centerline(name: str, area: Shape, lines: tuple[Coordinates, ...]) -> RoadDirection | None:
-    """The direction of the nearest segment of an element's centreline; None where the map gives none.
+def along_centerline(name: str, area: Shape, lines: Callable[[], tuple[Coordinates, ...]]) -> RoadDirection:
+    """The direction of the nearest segment of an element's centreline, which is read when somebody asks for it.
 
     Args:
         name: The element's identifier.
         area: Its polygon.
-        lines: The polylines of its centreline, (n, 2) each.
+        lines: Gives the polylines of its centreline, (n, 2) each.
     """
-    own = (DirectedLane(area, lines),)
-    return RoadDirection(own, f"orientation of {name}", farthest=_EVERYWHERE) if lines else None
+
+    def make() -> RoadDirection:
+        return RoadDirection((DirectedLane(area, lines()),), farthest=_EVERYWHERE)
+
+    return DeferredDirection(f"orientation of {name}", make, nowhere=None, has_beside=False, farthest=_EVERYWHERE)
 
 
 def direction_of_lanes(element: LaneGroup | Road | RoadSection) -> RoadDirection | None:

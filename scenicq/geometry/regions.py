@@ -110,6 +110,11 @@ class _Indexed:
         """The box around the set."""
         return shapes.total_bounds(self.pieces)
 
+    @property
+    def is_empty(self) -> bool:
+        """Whether there is nothing in it."""
+        return not self.pieces
+
     def near(self, bounds: Bounds) -> list[Shape]:
         """The pieces whose boxes meet the given one, in order."""
         found: list[int] = np.sort(shapes.tree_query(self.tree, shapes.box(*bounds))).tolist()
@@ -177,9 +182,9 @@ class PolylineSet(_Indexed):
 class DeferredPolylines(PolylineSet):
     """The union of polylines that are worked out when somebody asks for them."""
 
-    def __init__(self, name: str, make: Callable[[], PolylineSet]) -> None:
-        """Take the name, and what makes the region."""
-        vars(self).update(name=name, _make=make)
+    def __init__(self, name: str, make: Callable[[], PolylineSet], orientation: VectorField | None = None) -> None:
+        """Take the name, what makes the region, and its preferred heading if that is known before."""
+        vars(self).update(name=name, _make=make, _orientation=orientation)
 
     @cached_property
     def _made(self) -> PolylineSet:
@@ -193,7 +198,7 @@ class DeferredPolylines(PolylineSet):
     @property
     def orientation(self) -> VectorField | None:  # pyright: ignore[reportIncompatibleVariableOverride]
         """The preferred heading of what is placed in the region."""
-        return self._made.orientation
+        return vars(self)["_orientation"] or self._made.orientation
 
 
 @dataclass(frozen=True, eq=False)

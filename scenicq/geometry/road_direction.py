@@ -25,7 +25,7 @@ from scenicq.geometry.direction_surroundings import OffLanes
 from scenicq.geometry.fields import FieldCell
 from scenicq.geometry.shapes import Bounds, Coordinates, Shape
 
-__all__ = ["ONE_HEADING", "DirectedLane", "RoadDirection", "along_lines", "distinct_pairs"]
+__all__ = ["ONE_HEADING", "DeferredDirection", "DirectedLane", "RoadDirection", "along_lines", "distinct_pairs"]
 
 REACH = 20.0
 """Metres within which a point off all lanes takes the direction of the nearest one."""
@@ -61,6 +61,11 @@ class RoadDirection:
     def is_nowhere(self) -> bool:
         """Whether nothing has a direction."""
         return not any(len(DirectedAreas((lane,))) for lane in (*self.lanes, *self.beside)) and not self.elsewhere
+
+    @property
+    def has_beside(self) -> bool:
+        """Whether anything counts where no lane is."""
+        return bool(self.beside)
 
     @property
     def reach(self) -> tuple[Sequence[Shape], float] | None:
@@ -202,6 +207,70 @@ class RoadDirection:
     @cached_property
     def _surroundings(self) -> OffLanes:
         return OffLanes(self._lanes, self._beside, self._elsewhere, self.farthest)
+
+
+class DeferredDirection(RoadDirection):
+    """A direction of traffic whose lanes are read when somebody asks for them."""
+
+    def __init__(
+        self,
+        name: str,
+        make: Callable[[], RoadDirection],
+        *,
+        nowhere: bool | None,
+        has_beside: bool,
+        farthest: float = REACH,
+    ) -> None:
+        """Take what can be said before.
+
+        Args:
+            name: What messages call the field.
+            make: What makes it.
+            nowhere: Whether nothing has a direction; None where that must be read, too.
+            has_beside: Whether anything counts where no lane is.
+            farthest: As of `RoadDirection`.
+        """
+        vars(self).update(name=name, farthest=farthest, _make=make, _nowhere=nowhere, _has_beside=has_beside)
+
+    @cached_property
+    def _made(self) -> RoadDirection:
+        return vars(self)["_make"]()
+
+    @property
+    def is_nowhere(self) -> bool:
+        """Whether nothing has a direction."""
+        nowhere: bool | None = vars(self)["_nowhere"]
+        return self._made.is_nowhere if nowhere is None else nowhere
+
+    @property
+    def has_beside(self) -> bool:
+        """Whether anything counts where no lane is."""
+        return vars(self)["_has_beside"]
+
+    @property
+    def lanes(self) -> tuple[DirectedLane, ...]:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """The lanes."""
+        return self._made.lanes
+
+    @property
+    def beside(self) -> tuple[DirectedLane, ...]:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """What counts where no lane is."""
+        return self._made.beside
+
+    @property
+    def taken(self) -> tuple[Shape, ...]:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """Where that does not count either."""
+        return self._made.taken
+
+    @property
+    def elsewhere(self) -> tuple[Coordinates, ...]:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """What counts where there is none of both."""
+        return self._made.elsewhere
+
+    @property
+    def order(self) -> Callable[[], Sequence[int]] | None:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """Gives the order in which lanes count."""
+        return self._made.order
 
 
 def along_lines(lines: Sequence[Shape], name: str) -> RoadDirection:

@@ -7,6 +7,7 @@ nothing: every connection is an in-memory database with views over the manifest'
 from __future__ import annotations
 
 import sys
+import weakref
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, field
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 
 from scenicq.errors import DataError, Diagnostic, ScenicqError
 from scenicq.geometry.features import MapFeature
+from scenicq.geometry.map_traits import MapTraits
 from scenicq.geometry.network import Network
 from scenicq.store.frame_index import find_rows
 from scenicq.store.frame_names import ShortNames, find_frame, shortened
@@ -28,7 +30,7 @@ from scenicq.store.manifest import Manifest, read_manifest
 from scenicq.store.place import LocalFolder, Place, StoreFile, find_place
 from scenicq.store.reader import read_labels
 from scenicq.store.recorded_tracks import RecordedTracks
-from scenicq.store.regions import read_features
+from scenicq.store.regions import MapFiles
 from scenicq.store.scans import allowed_paths, scan
 from scenicq.store.sql import sql_list
 
@@ -66,7 +68,7 @@ class DatasetReference:
         return dataset
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, weakref_slot=True)
 class Dataset:
     """An opened dataset.
 
@@ -74,16 +76,20 @@ class Dataset:
         place: Where its files are.
         manifest: What `dataset.json` says.
         recorded: The tracks of its recordings.
+        mapped: The files of its maps.
     """
 
     place: Place
     manifest: Manifest
     recorded: RecordedTracks = field(init=False, compare=False, repr=False)
+    mapped: MapFiles = field(init=False, compare=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Nothing of its tracks is read before it is asked for."""
+        """Nothing of its tracks and maps is read before it is asked for."""
         # not of the dataset itself, which would live until somebody looks for circles
-        object.__setattr__(self, "recorded", RecordedTracks(partial(_files, self.place, self.manifest)))
+        files = partial(_files, self.place, self.manifest)
+        object.__setattr__(self, "recorded", RecordedTracks(files))
+        object.__setattr__(self, "mapped", MapFiles(files("regions"), self.manifest.map_groups))
 
     @property
     def name(self) -> str:
@@ -179,11 +185,18 @@ class Dataset:
     def features(self, map_name: str) -> tuple[MapFeature, ...]:
         """The elements of a map in its own order; none where the source has no such map."""
         with self.blamed():
-            return read_features(self.files("regions"), map_name)
+            return self.mapped.features(map_name)
 
     def network(self, map_name: str) -> Network:
-        """The road network of a map; empty where the source has no such map."""
-        return Network(map_name, self.features(map_name))
+        """The road network of a map, which is read when that is needed; empty where the source has no such map."""
+        # a network lives until somebody looks for circles, and the dataset's files are read under a lock
+        features = partial(_features, weakref.ref(self), self.mapped, map_name)
+        return Network(map_name, features, self.traits(map_name))
+
+    def traits(self, map_name: str) -> MapTraits | None:
+        """What is known of a map without reading it; None for nothing."""
+        found = self.mapped.traits(map_name)
+        return MapTraits() if found is None and map_name not in self.manifest.maps else found
 
     def labels(self, frames: Iterable[str] | None = None) -> Iterator[Label]:
         """Labels in order of recording, time and frame, read in batches: memory does not grow with the dataset.
@@ -289,6 +302,12 @@ class Dataset:
 
 def _files(place: Place, manifest: Manifest, table: str) -> tuple[StoreFile, ...]:
     return tuple(map(place.file, manifest.tables[table]))
+
+
+def _features(opened: weakref.ref[Dataset], mapped: MapFiles, map_name: str) -> tuple[MapFeature, ...]:
+    """The elements of a map of a dataset, which may not be open any more."""
+    dataset = opened()
+    return mapped.features(map_name) if dataset is None else dataset.features(map_name)
 
 
 def open_dataset(address: str | Path, *, older: bool = False, check: bool = True) -> Dataset:

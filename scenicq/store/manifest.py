@@ -22,6 +22,7 @@ __all__ = [
     "Counts",
     "LeftOut",
     "Manifest",
+    "MapGroup",
     "Part",
     "Provenance",
     "Whole",
@@ -61,6 +62,20 @@ class Counts(Struct, frozen=True):
 
     frames: Whole = 0
     objects: Whole = 0
+
+
+class MapGroup(Struct, frozen=True):
+    """Maps that are alike in all that is known of a map without reading it.
+
+    Attributes:
+        kinds: The kinds of their elements, in order.
+        directed: Whether traffic has a direction anywhere.
+        maps: Their names, in order.
+    """
+
+    kinds: tuple[str, ...]
+    directed: bool
+    maps: tuple[str, ...]
 
 
 class LeftOut(Struct, frozen=True):
@@ -108,6 +123,7 @@ class Manifest(Struct, frozen=True, kw_only=True, tag_field="format", tag=_FORMA
         importer: Name of the importer that read the source.
         tables: The files of each table.
         maps: Number of elements of each map.
+        map_groups: What is known of maps without reading them; earlier programs have not written it.
         total: Frames and label objects of the dataset.
         tracks: Distinct tracks, counted within each recording.
         span_us: First and last timestamp; None without frames.
@@ -131,6 +147,7 @@ class Manifest(Struct, frozen=True, kw_only=True, tag_field="format", tag=_FORMA
     by_source_class: dict[str, Whole]
     by_map: dict[str, Counts]
     by_recording: dict[str, Counts]
+    map_groups: tuple[MapGroup, ...] = ()
     left_out: tuple[LeftOut, ...] = ()
     provenance: Provenance = Provenance()
 

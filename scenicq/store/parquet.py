@@ -75,6 +75,15 @@ class TableWriter:
         if self._pending_rows >= _ROW_GROUP:
             self._flush(self._pending_rows // _ROW_GROUP * _ROW_GROUP)
 
+    def end_group(self, least: int) -> None:
+        """Let a row group end here, if it has so many rows: whoever looks for what follows reads no more than that.
+
+        Args:
+            least: The fewest rows of a row group.
+        """
+        if self._pending_rows >= least:
+            self._flush(self._pending_rows)
+
     def finish(self) -> Part:
         """Write what is left, sync, give the file its name, and describe it."""
         if self._pending_rows:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from scenicq.errors import ScenicqError
+from scenicq.geometry.map_traits import traits_of
 from scenicq.store.frame_index import frame_hashes, index_rows
 from scenicq.store.map_validation import check_lanes, check_regions
 from scenicq.store.rules import PART_COLUMNS, check_frame_index, check_part
@@ -36,11 +37,13 @@ def check_dataset(dataset: Dataset) -> None:
                 check_lanes(rows, part.path)
     for name in manifest.maps:
         try:
-            dataset.network(name)
+            found = traits_of(dataset.network(name).features)
         except (ScenicqError, MemoryError):
             raise
         except Exception as error:  # noqa: BLE001 - whatever a map that nobody has made by our rules leads to
             invalid(manifest.tables["regions"][0].path, f"map {name} cannot be put together: {error}"[:200])
+        if dataset.mapped.traits(name) not in (found, None):
+            invalid("dataset.json", f"says of map {name} what its elements do not")
     hashes = [np.empty(0, np.uint64)]
     frames = 0
     recordings: set[str] = set()

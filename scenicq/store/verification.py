@@ -33,7 +33,8 @@ def verify_computed(dataset: Dataset) -> None:
     manifest = dataset.manifest
     maps = {name: dataset.features(name) for name in manifest.maps}
     for part, file in zip(manifest.tables["lanes"], dataset.files("lanes"), strict=True):
-        _compare("lanes", read_sound("lanes", file, part.path), lane_rows(maps), part.path)
+        again = [SCHEMAS["lanes"].empty_table(), *(lane_rows(name, maps[name]) for name in sorted(maps))]
+        _compare("lanes", read_sound("lanes", file, part.path), pa.concat_tables(again), part.path)
     indexes = MapIndexes(maps)
     for number in range(len(manifest.tables["labels"])):
         with ExitStack() as files:

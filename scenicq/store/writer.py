@@ -19,7 +19,7 @@ from scenicq.store.atomic_files import write_whole
 from scenicq.store.columns import RecordingColumns, columns_of
 from scenicq.store.frame_index import frame_hashes, index_rows, repeated_rows
 from scenicq.store.labels import Recording
-from scenicq.store.manifest import MANIFEST, Counts, LeftOut, Manifest, Provenance
+from scenicq.store.manifest import MANIFEST, Counts, LeftOut, Manifest, MapGroup, Provenance
 from scenicq.store.parquet import TableWriter
 from scenicq.store.partial import Partial, check_target
 from scenicq.store.schema import SCHEMAS, SEGMENT_TABLES, ArrowTable
@@ -29,6 +29,9 @@ if TYPE_CHECKING:
     from scenicq.geometry.features import MapFeature
 
 __all__ = ["DatasetWriter", "write_dataset"]
+
+_MAP_ROWS = 512
+"""Fewest rows of a row group of maps that is followed by another: fewer are read as fast as these."""
 
 
 class DatasetWriter:
@@ -197,15 +200,18 @@ class DatasetWriter:
                 self._close_segment()
             segments = self.segments
             tables = {table: tuple(s.part(table, n) for n, s in enumerate(segments)) for table in SEGMENT_TABLES}
-            for table, rows in {**self._map_rows(), "frame_index": index_rows(self._hashes())}.items():
+            for table, pieces in {**self._map_rows(), "frame_index": [index_rows(self._hashes())]}.items():
                 writer = TableWriter(self.folder, table)
-                writer.add(rows)
+                for rows in pieces:
+                    writer.add(rows)
+                    writer.end_group(_MAP_ROWS)
                 tables[table] = (writer.finish(),)
             manifest = Manifest(
                 name=name,
                 importer=importer,
                 tables={table: tables[table] for table in SCHEMAS},
                 maps={key: len(self.maps[key]) for key in sorted(self.maps)},
+                map_groups=self._map_groups(),
                 left_out=tuple(left_out),
                 provenance=provenance or Provenance(),
                 **_totals(segments),
@@ -226,13 +232,24 @@ class DatasetWriter:
             Diagnostic("target-unwritable", f"{self._target} cannot be written: {error.strerror or error}")
         )
 
-    def _map_rows(self) -> dict[str, ArrowTable]:
-        """The rows of the tables of maps."""
+    def _map_groups(self) -> tuple[MapGroup, ...]:
+        """What is known of the maps without reading them."""
         if not any(self.maps.values()):
-            return {table: SCHEMAS[table].empty_table() for table in ("regions", "lanes")}
+            return ()
+        from scenicq.store.regions import map_groups  # noqa: PLC0415 - slow to load, and for maps
+
+        return map_groups(self.maps)
+
+    def _map_rows(self) -> dict[str, Iterable[ArrowTable]]:
+        """The rows of the tables of maps, map by map: each map shares row groups with few others."""
+        if not any(self.maps.values()):
+            return {"regions": (), "lanes": ()}
         from scenicq.store.regions import lane_rows, region_rows  # noqa: PLC0415 - slow to load, and for maps
 
-        return {"regions": region_rows(self.maps), "lanes": lane_rows(self.maps)}
+        return {
+            "regions": (region_rows(name, self.maps[name]) for name in sorted(self.maps)),
+            "lanes": (lane_rows(name, self.maps[name]) for name in sorted(self.maps)),
+        }
 
     def _close_segment(self) -> None:
         assert self._open is not None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
-from itertools import islice
+from itertools import groupby, islice
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,6 +25,7 @@ from scenicq.query.prefilter.decision import decided_frames
 from scenicq.query.prefilter.executor import Block, keep_players, names, run_players, run_prefilter
 from scenicq.query.prefilter.plan import LABELS, Plan, make_plan
 from scenicq.query.prefilter.survivors import Candidate, CandidateRows, candidate_rows, candidates
+from scenicq.recent import Recent
 from scenicq.store.dataset import Dataset
 from scenicq.store.labels import Label
 from scenicq.temporal.interval_options import IntervalOptions
@@ -39,7 +40,9 @@ if TYPE_CHECKING:  # they take long to load, and not every query needs the last 
 
 _FIRST_BATCH, _BATCH = 16, 2048
 """Labels whose places are looked up together: few until it is known what matters."""
-__all__ = ["CompiledMap", "Decided", "Decider", "every_label"]
+MAPS_KEPT = 8
+"""Maps of which a process keeps what it needs to match: each is a few megabytes, and labels come map by map."""
+__all__ = ["MAPS_KEPT", "CompiledMap", "Decided", "Decider", "every_label"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +56,7 @@ class CompiledMap:
         motion: Whether the scenario reads observed motion.
         observed: The properties of label objects that matter; None for all.
         whole: Whether all label objects matter, not only those that may play a role.
+        anywhere: Whether all but the network is the same over any map of the same traits.
     """
 
     scenario: Scenario
@@ -61,6 +65,7 @@ class CompiledMap:
     motion: bool = True
     observed: frozenset[str] | None = None
     whole: bool = False
+    anywhere: bool = False
 
     @classmethod
     def of(
@@ -76,7 +81,8 @@ class CompiledMap:
             plan = make_plan(scenario, network, options, deciding=not proofs, counting=reasons)
         asked = properties_of_others(scenario)
         observed = frozenset[str](asked or ()).union(*relevant_properties(scenario, options))
-        return cls(scenario, network, plan, not MOTION.isdisjoint(observed), observed, asked is not None)
+        motion = not MOTION.isdisjoint(observed)
+        return cls(scenario, network, plan, motion, observed, asked is not None, not network.is_read)
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +110,8 @@ class Decider:
         dataset: The dataset.
         options: Of the matcher.
         solver: By name.
-        compile_map: Compiles the program for a map; called once a map.
+        plan_map: Gives the program over a map, or over one that differs in nothing that the prefilter asks for.
+        compile_map: Gives the program over a map; what is not asked for again soon is not kept.
         threads: Of the database.
         all_matches: Whether every correspondence is a result.
         every: Whether the names of excluded frames are wanted.
@@ -117,6 +124,7 @@ class Decider:
     dataset: Dataset
     options: MatchOptions
     solver: str
+    plan_map: Callable[[str], CompiledMap]
     compile_map: Callable[[str], CompiledMap]
     threads: int | None
     all_matches: bool
@@ -125,10 +133,9 @@ class Decider:
     reasons: bool = True
     time: IntervalOptions = field(default_factory=IntervalOptions)
     until: float | None = None
-    _recorders: dict[str, Recorder] = field(default_factory=dict["str", "Recorder"])
-    _compiled: dict[str, CompiledMap] = field(default_factory=dict["str", CompiledMap])
-    _matchers: dict[str, Matcher] = field(default_factory=dict["str", "Matcher"])
-    _over_time: dict[str, RecordingMatcher] = field(default_factory=dict["str", "RecordingMatcher"])
+    _recorders: Recent[str, Recorder] = field(default_factory=lambda: Recent(MAPS_KEPT))
+    _matchers: Recent[str, Matcher] = field(default_factory=lambda: Recent(MAPS_KEPT))
+    _over_time: Recent[str, RecordingMatcher] = field(default_factory=lambda: Recent(MAPS_KEPT))
     _open: ExitStack = field(default_factory=ExitStack)
     _connection: duckdb.DuckDBPyConnection | None = None
     _solver: LazySolver | None = None
@@ -161,7 +168,7 @@ class Decider:
             decided = self._decide(block)
         if self.until is not None:
             decided = replace(decided, found=self._in_time(iter(decided.found)))
-        recorder = self._recorder(self._compiled[block.map])
+        recorder = self._recorder(block.map)
         if recorder is None:
             return decided
         # what was found in time is recorded, however late it is then
@@ -180,28 +187,25 @@ class Decider:
             yield each
 
     def _decide(self, block: Block) -> Decided:
-        connection = self.connection
-        if block.map not in self._compiled:
-            self._compiled[block.map] = self.compile_map(block.map)
-        compiled = self._compiled[block.map]
+        connection, compiled = self.connection, self.plan_map(block.map)
         if block.runs:
             return self._recordings(compiled, block)
         if not compiled.plan.stages:
             labels = [Candidate(label, None) for label in every_label(self.dataset, block, motion=compiled.motion)]
-            return Decided(np.full(len(labels), -1, np.int16), self._matched(compiled, iter(labels)), [])
+            return Decided(np.full(len(labels), -1, np.int16), self._matched(iter(labels)), [])
         missed = run_prefilter(self.dataset, connection, compiled.plan, block)
         named = names(self.dataset, connection, block) if self.every else []
         if not (missed < 0).any():
             return Decided(missed, [], named)
         if compiled.plan.decision and not self.all_matches:
             return Decided(missed, self._partly_decided(compiled), named)
-        return Decided(missed, self._matched(compiled, self._left(compiled)), named)
+        return Decided(missed, self._matched(self._left(compiled)), named)
 
     def _partly_decided(self, compiled: CompiledMap) -> Iterator[list[Result]]:
         """The results of the frames that the prefilter has left, where SQL says that some surely match."""
         rows = decided_frames(self.connection, compiled.plan.decision, LABELS, compiled.plan.left)
         open_ = np.array([number for number, sure, *_ in rows if not sure], dtype=np.int64)
-        asked = self._matched(compiled, self._left(compiled, open_) if len(open_) else iter(()))
+        asked = self._matched(self._left(compiled, open_) if len(open_) else iter(()))
         proved, none = Match({}, {}), dict[str, str]()
         for _, sure, frame, recording, time in rows:
             yield [Result(frame, recording, time, proved, none)] if sure else next(asked)
@@ -225,7 +229,7 @@ class Decider:
         # takes long to load
         from scenicq.query.execution.recording_matcher import Survivors  # noqa: PLC0415
 
-        recordings = self._recording_matcher(compiled)
+        recordings = self._recording_matcher(block.map)
         connection, plan = self.connection, compiled.plan
         rows: CandidateRows | None = None
         # recordings are of one map
@@ -260,17 +264,17 @@ class Decider:
         left = Survivors(every[missed < 0], rows, plan.roles or (), read)
         return Decided(missed, [], [], recordings.decide(block, left))
 
-    def _recorder(self, compiled: CompiledMap) -> Recorder | None:
+    def _recorder(self, map_name: str) -> Recorder | None:
         """What works out what the program records; None where nobody reads that."""
-        if not (self.proofs and compiled.scenario.records):
+        if not (self.proofs and self.plan_map(map_name).scenario.records):
             return None
-        name = compiled.network.name
-        if name not in self._recorders:
-            # takes long to load
-            from scenicq.query.execution.recorder import Recorder  # noqa: PLC0415
+        # takes long to load
+        from scenicq.query.execution.recorder import Recorder  # noqa: PLC0415
 
-            self._recorders[name] = Recorder(self.dataset, compiled.scenario, self.options)
-        return self._recorders[name]
+        def make() -> Recorder:
+            return Recorder(self.dataset, self.compile_map(map_name).scenario, self.options)
+
+        return self._recorders.get(map_name, make)
 
     def _players(
         self, plan: Plan, block: Block, frames: NDArray[np.int64]
@@ -287,42 +291,42 @@ class Decider:
         missed = np.where(left, -1, 0).astype(np.int16)
         return missed, {name: each[left[place]] for name, each in found.items()}
 
-    def _recording_matcher(self, compiled: CompiledMap) -> RecordingMatcher:
-        name = compiled.network.name
-        if name not in self._over_time:
-            # take long to load
-            from scenicq.query.execution.recording_matcher import RecordingMatcher  # noqa: PLC0415
-            from scenicq.temporal.intervals import IntervalMatcher  # noqa: PLC0415
+    def _recording_matcher(self, map_name: str) -> RecordingMatcher:
+        # take long to load
+        from scenicq.query.execution.recording_matcher import RecordingMatcher  # noqa: PLC0415
+        from scenicq.temporal.intervals import IntervalMatcher  # noqa: PLC0415
 
-            intervals = IntervalMatcher(compiled.scenario, self.options, self.time, self._solver, self.reasons)
-            matcher = self._matcher(compiled)
-            self._over_time[name] = RecordingMatcher(
-                self.dataset, matcher, intervals, self.every, self.proofs, self.reasons
-            )
-        return self._over_time[name]
+        def make() -> RecordingMatcher:
+            scenario = self.compile_map(map_name).scenario
+            intervals = IntervalMatcher(scenario, self.options, self.time, self._solver, self.reasons)
+            matcher = self._matcher(map_name)
+            return RecordingMatcher(self.dataset, matcher, intervals, self.every, self.proofs, self.reasons)
 
-    def _matcher(self, compiled: CompiledMap) -> Matcher:
+        return self._over_time.get(map_name, make)
+
+    def _matcher(self, map_name: str) -> Matcher:
         """The matcher of a map, where SQL has not decided everything."""
-        name = compiled.network.name
-        if name not in self._matchers:
-            # takes long to load
-            from scenicq.match.matcher import Matcher  # noqa: PLC0415
+        # takes long to load
+        from scenicq.match.matcher import Matcher  # noqa: PLC0415
 
-            self._matchers[name] = Matcher(compiled.scenario, self.options, self._solver)
-        return self._matchers[name]
+        def make() -> Matcher:
+            return Matcher(self.compile_map(map_name).scenario, self.options, self._solver)
 
-    def _matched(self, compiled: CompiledMap, left: Iterator[Candidate]) -> Iterator[list[Result]]:
+        return self._matchers.get(map_name, make)
+
+    def _matched(self, left: Iterator[Candidate]) -> Iterator[list[Result]]:
         """The results of labels, whose places are looked up so many at a time."""
-        matcher = self._matcher(compiled)
         size = _FIRST_BATCH
-        while batch := list(islice(left, size)):
-            if self.all_matches:
-                for label, among in batch:
-                    yield [_result(label, verdict) for verdict in _every_match(matcher, label, among)]
-            else:
-                for (label, _), verdict in zip(batch, matcher.match_all(batch, details=self.every), strict=True):
-                    yield [_result(label, verdict)]
-            size = _BATCH
+        for map_name, mine in groupby(left, key=lambda each: each.label.map):
+            matcher = self._matcher(map_name)
+            while batch := list(islice(mine, size)):
+                if self.all_matches:
+                    for label, among in batch:
+                        yield [_result(label, verdict) for verdict in _every_match(matcher, label, among)]
+                else:
+                    for (label, _), verdict in zip(batch, matcher.match_all(batch, details=self.every), strict=True):
+                        yield [_result(label, verdict)]
+                size = _BATCH
 
 
 def _with_records(recorder: Recorder, found: Iterator[list[Result]]) -> Iterator[list[Result]]:
@@ -354,9 +358,5 @@ def _every_match(matcher: Matcher, label: Label, among: Candidates | None) -> li
 
 def every_label(dataset: Dataset, block: Block, *, motion: bool = False) -> Iterator[Label]:
     """The labels of a block, read without the database."""
-    first, last = block.recordings or ("", None)
-    return (
-        label
-        for label in dataset.labels_at(block.part, block.first, block.end, motion=motion)
-        if label.map == block.map and label.recording >= first and (last is None or label.recording <= last)
-    )
+    labels = dataset.labels_at(block.part, block.first, block.end, motion=motion)
+    return (label for label in labels if block.has(label.map, label.recording))

@@ -108,7 +108,7 @@ _OF_MAPS = frozenset({"map-lacks", "runtime-error", "impossible-requirement"})
 
 def about_dataset(error: ScenarioError, dataset: Dataset, map_name: str) -> ScenarioError:
     """The error with the dataset in it, where a map lacks what the program needs; any other as it is."""
-    absent = not dataset.features(map_name)
+    absent = not dataset.network(map_name).kinds
     told: list[Diagnostic] = []
     for each in error.diagnostics:
         if each.code != "map-lacks":

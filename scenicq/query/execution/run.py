@@ -18,12 +18,13 @@ from scenicq.compiler.program import compile_scenario
 from scenicq.compiler.temporal import REACTION_S, Behaviors
 from scenicq.errors import DataError, Diagnostic, ScenarioError, Source
 from scenicq.forest.scenario import Scenario
+from scenicq.geometry.map_traits import MapTraits
 from scenicq.geometry.network import Network
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.preprocess import ready
 from scenicq.match.verdict import Cause, NoMatch
 from scenicq.query.execution.block_executor import BlockExecutor
-from scenicq.query.execution.block_matcher import CompiledMap, Decided, Decider
+from scenicq.query.execution.block_matcher import MAPS_KEPT, CompiledMap, Decided, Decider
 from scenicq.query.execution.compiled_map import (
     about_dataset,
     is_about_map,
@@ -37,8 +38,9 @@ from scenicq.query.execution.never_compared import Coverage, coverage
 from scenicq.query.execution.program_files import SiblingFiles
 from scenicq.query.execution.recorded_columns import RecordedColumn, columns_of
 from scenicq.query.execution.results import Funnel, Result, up_to
-from scenicq.query.prefilter.executor import Block, Extent, blocks, extents, names, whole_recordings
+from scenicq.query.prefilter.executor import Block, Extent, blocks, blocks_of, extents, names, whole_recordings
 from scenicq.query.prefilter.plan import Plan
+from scenicq.recent import Recent
 from scenicq.store.dataset import Dataset, DatasetReference
 from scenicq.store.manifest import Counts
 from scenicq.temporal.interval_options import IntervalOptions
@@ -119,10 +121,23 @@ class RecordingRange:
 
 @dataclass(slots=True)
 class _Known:
-    """What a query has found out once, for it and its copies with other recordings."""
+    """What a query has found out once, for it and its copies with other recordings.
 
-    compiled: dict[str, CompiledMap] = field(default_factory=dict["str", "CompiledMap"])
+    Attributes:
+        compiled: The program over maps that it has read, and one of each of those that are alike.
+        recent: The program over others of these.
+        alike: The program over one of the maps with the same traits, where it asks for nothing else.
+        lacking: What maps lack that the program needs.
+        looked: Whether this was asked of all maps.
+        extents: Where the frames of each map are.
+        coverage: What is compared.
+    """
+
+    compiled: dict[str, CompiledMap] = field(default_factory=dict["str", CompiledMap])
+    recent: Recent[str, CompiledMap] = field(default_factory=lambda: Recent(MAPS_KEPT))
+    alike: dict[MapTraits, CompiledMap] = field(default_factory=dict[MapTraits, CompiledMap])
     lacking: dict[str, ScenarioError] = field(default_factory=dict["str", "ScenarioError"])
+    looked: bool = False
     extents: dict[str, list[Extent]] | None = None
     coverage: Coverage | None = None
 
@@ -187,37 +202,73 @@ class Query:
             )
 
     def compiled_map(self, map_name: str) -> CompiledMap:
-        """The scenario over one of the dataset's maps, with its prefilter; compiled once.
+        """The scenario over one of the dataset's maps, with its prefilter; kept if it is asked for again soon.
 
         Raises:
             ScenarioError: The program is wrong, or does not fit the map.
         """
-        compiled = self._known.compiled
-        if map_name not in compiled:
-            options = self.options
-            scenario, network = self.compile(map_name)
-            how = {"prefilter": options.prefilter, "proofs": options.proofs, "reasons": self._reasons(scenario)}
-            compiled[map_name] = CompiledMap.of(scenario, network, options.match, **how)
-        return compiled[map_name]
+        known = self._known
+        if map_name in known.compiled:
+            return known.compiled[map_name]
+        compiled = known.recent.get(map_name, lambda: self._compile_map(map_name))
+        traits = self.dataset.traits(map_name) if compiled.anywhere else None
+        if traits is None or traits not in known.alike:
+            known.compiled[map_name] = compiled
+        if traits is not None:
+            known.alike.setdefault(traits, compiled)
+        return compiled
 
-    def _compiled_maps(self) -> dict[str, CompiledMap | Diagnostic]:
-        """The scenario over each map, or what the map lacks; an error if it fits none."""
+    def _compile_map(self, map_name: str) -> CompiledMap:
+        options = self.options
+        scenario, network = self.compile(map_name)
+        how = {"prefilter": options.prefilter, "proofs": options.proofs, "reasons": self._reasons(scenario)}
+        return CompiledMap.of(scenario, network, options.match, **how)
+
+    def planned_map(self, map_name: str) -> CompiledMap:
+        """The scenario over a map, or over another from which it differs in no more than the network.
+
+        Raises:
+            ScenarioError: The program is wrong, or does not fit the map.
+        """
+        known = self._known
+        if map_name in known.compiled:
+            return known.compiled[map_name]
+        if map_name in known.lacking:
+            raise known.lacking[map_name].with_traceback(None)
+        traits = self.dataset.traits(map_name)
+        alike = None if traits is None else known.alike.get(traits)
+        try:
+            return self.compiled_map(map_name) if alike is None else alike
+        except ScenarioError as error:
+            if is_about_map(error):
+                known.lacking[map_name] = error
+            raise
+
+    def _lacking_maps(self) -> dict[str, Diagnostic]:
+        """What maps lack that the program needs, by the map; an error if it fits none."""
         self._check_ego()
-        lacking = self._known.lacking
-        for name in self.dataset.maps:
-            if name in lacking:
-                continue
-            try:
-                self.compiled_map(name)
-            except ScenarioError as error:
-                if not is_about_map(error):
-                    raise
-                lacking[name] = error
+        known = self._known
+        if not known.looked:
+            self._scenarios()
+            known.looked = True
+        lacking = known.lacking
         if lacking and len(lacking) == len(self.dataset.maps):
             wrong = (error for error in lacking.values() if error.diagnostics[0].code != "map-lacks")
             raise next(wrong, None) or next(iter(lacking.values()))
-        told = {name: error.diagnostics[0] for name, error in lacking.items()}
-        return {name: told.get(name) or self.compiled_map(name) for name in self.dataset.maps}
+        return {name: error.diagnostics[0] for name, error in lacking.items()}
+
+    def _scenarios(self, maps: Iterable[str] | None = None) -> list[Scenario]:
+        """The scenario over the maps that it fits, one of those that are alike; arguments as of `fitting`."""
+        found: dict[int, Scenario] = {}
+        for name in self.dataset.maps if maps is None else maps:
+            try:
+                scenario = self.planned_map(name).scenario
+            except ScenarioError as error:
+                if not is_about_map(error):
+                    raise
+            else:
+                found.setdefault(id(scenario), scenario)
+        return list(found.values())
 
     def misfits(self) -> list[Diagnostic]:
         """Warnings of the maps on which no frame can match, one for all that lack the same.
@@ -225,20 +276,19 @@ class Query:
         Raises:
             ScenarioError: The program is wrong, or fits no map.
         """
-        told = {name: each for name, each in self._compiled_maps().items() if isinstance(each, Diagnostic)}
-        return list(misfit_remarks(told, self.dataset.manifest))
+        return list(misfit_remarks(self._lacking_maps(), self.dataset.manifest))
 
-    def _warn(self, compiled: Mapping[str, CompiledMap | Diagnostic]) -> None:
+    def _warn(self, lacking: Mapping[str, Diagnostic]) -> None:
         """Note in the funnel what the author should know, and count the frames on maps that cannot match."""
-        for name, told in compiled.items():
-            if isinstance(told, Diagnostic) and (here := self.frames(name)):
+        for name in lacking:
+            if here := self.frames(name):
                 self.funnel.frames += here
                 self.funnel.excluded[f"{MAP_LACKS}{name}"] += here
         self.funnel.warnings += self.misfits()
-        fitting = [each for each in compiled.values() if isinstance(each, CompiledMap)]
-        if fitting:
+        first = next((name for name in self.dataset.maps if name not in lacking), None)
+        if first is not None:
             compared = self.coverage()
-            self.funnel.warnings += [*compared.warnings, *program_remarks(fitting[0].scenario)]
+            self.funnel.warnings += [*compared.warnings, *program_remarks(self.planned_map(first).scenario)]
             self.funnel.missing.update(compared.missing)
             if remark := map_remark(self.source, self.options.version, self.dataset):
                 self.funnel.warnings.append(remark)
@@ -248,7 +298,7 @@ class Query:
 
         Arguments as of `fitting`.
         """
-        scenarios = [compiled.scenario for compiled in self.fitting(maps)]
+        scenarios = self._scenarios(maps)
         said = (each for scenario in scenarios for each in scenario.warnings)
         left_out = (each for scenario in scenarios for each in scenario.ignored if each.code == "not-recorded")
         by_place = {(each.message, each.span): each for each in left_out}
@@ -270,6 +320,11 @@ class Query:
                 if not is_about_map(error):
                     raise
 
+    def fitting_maps(self) -> list[str]:
+        """The maps that the program fits, in order; an error if it fits none."""
+        lacking = self._lacking_maps()
+        return [name for name in self.dataset.maps if name not in lacking]
+
     def coverage(self, maps: Sequence[str] | None = None) -> Coverage:
         """How much of what the program sets is compared with the labels; found out once.
 
@@ -281,7 +336,7 @@ class Query:
         """
         self._check_ego()
         if self._known.coverage is None:
-            scenarios = [each.scenario for each in self.fitting(maps)]
+            scenarios = self._scenarios(maps)
             self._known.coverage = coverage(self.dataset, scenarios, self.options.match)
         found = self._known.coverage
         if self.options.strict and found.warnings:
@@ -297,7 +352,9 @@ class Query:
             compiled: The scenario over that map, with its prefilter.
             options: The options.
         """
-        known = replace(self._known, compiled={**self._known.compiled, map_name: compiled})
+        known = replace(
+            self._known, compiled={**self._known.compiled, map_name: compiled}, alike=dict(self._known.alike)
+        )
         options = replace(options, jobs=1, limit=None, every=False)
         chosen = {map_name: RecordingRange(recording, recording, self.dataset.manifest.by_recording[recording].frames)}
         return Query(self.dataset, self.source, options, chosen, files=self.files, _known=known)
@@ -314,18 +371,19 @@ class Query:
 
     def roles(self) -> tuple[str, ...]:
         """Names of the scenario's objects, of all maps that it fits."""
-        compiled = [each.scenario for each in self._compiled_maps().values() if isinstance(each, CompiledMap)]
-        return tuple(dict.fromkeys(owner.name for scenario in compiled for owner in scenario.objects))
+        self._lacking_maps()
+        return tuple(dict.fromkeys(owner.name for scenario in self._scenarios() for owner in scenario.objects))
 
     def recorded_columns(self) -> tuple[RecordedColumn, ...]:
         """What the program records, over all maps that it fits."""
-        scenarios = [each.scenario for each in self._compiled_maps().values() if isinstance(each, CompiledMap)]
+        self._lacking_maps()
+        scenarios = self._scenarios()
         return columns_of(scenarios, over_time=any(map(self.over_time, scenarios)))
 
     def plans(self) -> list[Plan]:
         """The prefilter on each map."""
-        compiled = self._compiled_maps().items()
-        return [each.plan for name, each in compiled if isinstance(each, CompiledMap) and self.frames(name)]
+        there = filter(self.frames, self.fitting_maps())
+        return [replace(self.planned_map(name).plan, map=name) for name in there]
 
     def blocks(self, map_name: str, least: int = 1, connection: duckdb.DuckDBPyConnection | None = None) -> list[Block]:
         """The frames of a map that are looked at, cut into blocks in the order of the store.
@@ -335,11 +393,32 @@ class Query:
             least: Blocks that there should be, unless they would become very small.
             connection: To the dataset, where there is one: each takes 15 ms.
         """
+        where = self._extents(connection)
+        return blocks(where, map_name, self._between(map_name), least=least, whole=self.options.prefilter)
+
+    def _extents(self, connection: duckdb.DuckDBPyConnection | None) -> dict[str, list[Extent]]:
+        """Where the frames of each map are; found out once."""
         if self._known.extents is None:
             there = nullcontext(connection) if connection else closing(self.dataset.connect(views=False))
             with there as opened:
                 self._known.extents = extents(self.dataset, opened)
-        return blocks(self._known.extents, map_name, self._between(map_name), least=least, whole=self.options.prefilter)
+        return self._known.extents
+
+    def _map_runs(self, lacking: Mapping[str, Diagnostic]) -> Iterator[list[str]]:
+        """The maps that are looked at, in order, those together over which blocks may go."""
+        run: list[str] = []
+        last: CompiledMap | None = None
+        for name in filter(self.frames, self.dataset.maps):
+            here = None if name in lacking else self.planned_map(name)
+            # what happens over time, or is recorded, is of one map
+            joins = here is not None and here is last and not (self.over_time(here.scenario) or here.scenario.records)
+            if run and not joins:
+                yield run
+                run = []
+            run.append(name)
+            last = here
+        if run:
+            yield run
 
     def decider(self, threads: int | None = None) -> Decider:
         """What decides the blocks of this query in one process; to be used in a `with` statement.
@@ -352,6 +431,7 @@ class Query:
             self.dataset,
             options.match,
             options.solver,
+            self.planned_map,
             self.compiled_map,
             threads=threads,
             all_matches=options.all_matches,
@@ -377,8 +457,10 @@ class Query:
         Raises:
             ScenarioError: The program is wrong.
         """
-        compiled = next(self.fitting(), None)
-        return compiled is not None and self.over_time(compiled.scenario)
+        for name in self.dataset.maps:
+            if scenarios := self._scenarios([name]):
+                return self.over_time(scenarios[0])
+        return False
 
     def results(self, progress: Callable[[int], None] | None = None) -> Generator[Result]:
         """Results in the order of recording, time and frame, map by map.
@@ -392,8 +474,8 @@ class Query:
         return up_to(self.options.limit, self._all_results(progress), self.funnel)
 
     def _all_results(self, progress: Callable[[int], None] | None) -> Generator[Result]:
-        compiled = self._compiled_maps()
-        self._warn(compiled)
+        lacking = self._lacking_maps()
+        self._warn(lacking)
         ahead = FramesAhead(progress)
         with ExitStack() as stack:
             stack.enter_context(self.dataset.blamed())
@@ -401,13 +483,14 @@ class Query:
             decider = self.decider()
             executor = BlockExecutor(self.dataset, self.options.jobs, decider, _start_worker, setup)
             hands = stack.enter_context(executor)
-            for name, there in compiled.items():
-                if not self.frames(name):
+            for maps in self._map_runs(lacking):
+                if maps[0] in lacking:
+                    yield from self._lacking(maps[0], lacking[maps[0]], ahead.taken)
                     continue
-                if isinstance(there, Diagnostic):
-                    yield from self._lacking(name, there, ahead.taken)
-                    continue
-                cut = self.blocks(name, 4 * hands.jobs if hands.jobs > 1 else 1, decider.connection)
+                there = self.planned_map(maps[0])
+                where, chosen = self._extents(decider.connection), {name: self._between(name) for name in maps}
+                least = 4 * hands.jobs if hands.jobs > 1 else 1
+                cut = blocks_of(where, chosen, least=least, whole=self.options.prefilter)
                 every, reasons = self.options.every, self._reasons(there.scenario)
                 merge = partial(merge_frames, every=every, reasons=reasons)
                 if self.over_time(there.scenario):

@@ -80,7 +80,7 @@ class _Order:
     def _recordings(self) -> Iterator[_Run]:
         """The recordings in order; of a map that lacks what the program needs there is none."""
         query = self._query
-        fitting = {compiled.network.name for compiled in query.fitting()}
+        fitting = set(query.fitting_maps())
         counted = f"SELECT map, recording, count(*) FROM {self._labels} GROUP BY ALL"
         for name, recording, frames in sorted(self._connection.execute(counted).fetchall()):
             chosen = None if query.recordings is None else query.recordings.get(name)

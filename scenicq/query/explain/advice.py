@@ -140,11 +140,11 @@ def advice(query: Query, *, budget_s: float = math.inf, brief: bool = False) -> 
     """
     excluded = [each for each in query.funnel.excluded.most_common() if not each[0].startswith(MAP_LACKS)]
     without_map = query.funnel.excluded.total() - sum(frames for _, frames in excluded)
-    worlds = {world.network.name: world for world in query.fitting() if query.blocks(world.network.name)}
-    if not worlds:
+    there = [name for name in query.fitting_maps() if query.frames(name)]
+    if not there:
         return Advice(tuple(excluded[:3]), (), complete=True, without_map=without_map)
     rank = {what: place for place, (what, _) in enumerate(excluded)}
-    scenario = next(iter(worlds.values())).scenario
+    scenario = query.planned_map(there[0]).scenario
     for what in tuple(rank):
         # a wider tolerance is tried after the first feature that it concerns
         rank.setdefault(what.rpartition(".")[2], rank[what])
@@ -159,7 +159,7 @@ def advice(query: Query, *, budget_s: float = math.inf, brief: bool = False) -> 
     complete = True
     with ExitStack() as stack, limited(min(budget_s, time_left_s(query.options.until))):
         runs, maps = (LIMITS.brief_runs, LIMITS.brief_maps) if brief else (LIMITS.advice_runs, LIMITS.advice_maps)
-        sample = _sample(query, worlds, stack, runs, maps)
+        sample = _sample(query, there, stack, runs, maps)
         solver = stack.enter_context(LazySolver(query.options.solver))
         for number, change in enumerate(changes):
             if number and (time_is_up() or number >= (few if found else LIMITS.advice_changes)):
@@ -206,11 +206,11 @@ def _pairs(changes: Sequence[Change], most: int) -> Iterator[Change]:
     return itertools.starmap(combine, itertools.combinations(dropping[:most], 2))
 
 
-def _sample(query: Query, worlds: Mapping[str, CompiledMap], stack: ExitStack, runs: int, maps: int) -> _Sample:
+def _sample(query: Query, there: Sequence[str], stack: ExitStack, runs: int, maps: int) -> _Sample:
     """Read the frames that changes are tried on."""
-    total = sum(map(query.frames, worlds))
-    step = max(1, -(-len(worlds) // maps))
-    chosen = dict(list(worlds.items())[::step])
+    total = sum(map(query.frames, there))
+    step = max(1, -(-len(there) // maps))
+    chosen = {name: query.compiled_map(name) for name in there[::step]}
     held: dict[str, duckdb.DuckDBPyConnection] = {}
     frames = 0
     for name in chosen:

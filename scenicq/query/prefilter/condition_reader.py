@@ -352,7 +352,7 @@ class ConditionReader:
         if not directions:
             return near
         # the columns of directions know less than the map does beside the lanes
-        off = [f"{alias}lane IS NULL"] if self.road.beside else []
+        off = [f"{alias}lane IS NULL"] if self.road.has_beside else []
         if self.proving:
             return all_of([f"len({directions}) > 0", *map(SQL.negation, off), near])
         return any_of([f"{own} IS NULL", *off, near])

@@ -9,6 +9,7 @@ A block is a run of frames in one part of the store, so memory depends on the si
 
 from __future__ import annotations
 
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, groupby, islice, pairwise
@@ -30,6 +31,7 @@ __all__ = [
     "Block",
     "Extent",
     "blocks",
+    "blocks_of",
     "extents",
     "hold",
     "join_first",
@@ -55,24 +57,36 @@ class Extent:
         part: Number of the part.
         first, end: From the first row of its labels to behind the last; frames of other maps may lie between.
         recordings: The least and the greatest name of a recording.
+        frames: How many frames of the map there are.
     """
 
     part: int
     first: int
     end: int
     recordings: tuple[str, str]
+    frames: int
+
+    def alone(self, recordings: tuple[str, str] | None) -> bool:
+        """Whether no frame of another map, or of another recording than asked for, lies between.
+
+        Args:
+            recordings: The first and the last recording that is asked for; None for all.
+        """
+        whole = recordings is None or (recordings[0] <= self.recordings[0] and self.recordings[1] <= recordings[1])
+        return whole and self.frames == self.end - self.first
 
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """Frames of one map that follow each other in one part of the store.
+    """Frames of one map, or of several over which a program is the same, that follow each other in one part.
 
     Attributes:
-        map: The map.
+        map: The map; of several the first.
         part: Number of the part.
         first, end: The rows of its labels, the end left out.
         recordings: Only from the first of these to the second, in order of their names; None for all.
         runs: Of a query over time, the first and the last row of each recording, the last left out: they stay whole.
+        maps: Where its rows are those of several maps, and of nothing else: their names in the order of the rows.
     """
 
     map: str
@@ -81,6 +95,7 @@ class Block:
     end: int
     recordings: tuple[str, str] | None = None
     runs: tuple[tuple[int, int], ...] = ()
+    maps: tuple[str, ...] = ()
 
     @property
     def divisible(self) -> bool:
@@ -98,10 +113,29 @@ class Block:
     @property
     def where(self) -> str:
         """What selects its rows of `labels`, in SQL."""
+        rows = f"file_row_number BETWEEN {self.first} AND {self.end - 1}"
+        if self.maps:
+            return rows
         between = "" if self.recordings is None else " AND recording BETWEEN {} AND {}".format(
             *map(sql_text, self.recordings)
         )  # fmt: skip
-        return f"map = {sql_text(self.map)} AND file_row_number BETWEEN {self.first} AND {self.end - 1}{between}"
+        return f"map = {sql_text(self.map)} AND {rows}{between}"
+
+    def has(self, map_name: str, recording: str) -> bool:
+        """Whether frames of a recording on a map, that lie between its rows, are among its frames."""
+        if self.maps:
+            return True
+        first, last = self.recordings or ("", None)
+        return map_name == self.map and recording >= first and (last is None or recording <= last)
+
+    def followed_by(self, other: Block) -> Block | None:
+        """Both as one block; None where the other does not follow, or is of another map."""
+        if (self.part, self.end, self.recordings) != (other.part, other.first, other.recordings):
+            return None
+        if bool(self.maps) != bool(other.maps) or (not self.maps and self.map != other.map):
+            return None
+        maps = tuple(dict.fromkeys((*self.maps, *other.maps)))
+        return replace(self, end=other.end, runs=(*self.runs, *other.runs), maps=maps)
 
 
 def extents(dataset: Dataset, connection: duckdb.DuckDBPyConnection) -> dict[str, list[Extent]]:
@@ -114,11 +148,11 @@ def extents(dataset: Dataset, connection: duckdb.DuckDBPyConnection) -> dict[str
     found: dict[str, list[Extent]] = {}
     for part in range(len(dataset.files("labels"))):
         rows = connection.execute(
-            "SELECT map, min(file_row_number), max(file_row_number) + 1, min(recording), max(recording) "
+            "SELECT map, min(file_row_number), max(file_row_number) + 1, min(recording), max(recording), count(*) "
             f"FROM {dataset.scan('labels', part, numbered=True)} GROUP BY map"
         ).fetchall()
-        for name, first, end, low, high in rows:
-            found.setdefault(name, []).append(Extent(part, first, end, (low, high)))
+        for name, first, end, low, high, frames in rows:
+            found.setdefault(name, []).append(Extent(part, first, end, (low, high), frames))
     return found
 
 
@@ -130,7 +164,7 @@ def blocks(
     least: int = 1,
     whole: bool = True,
 ) -> list[Block]:
-    """The frames of a map, cut into blocks in the order of the store.
+    """The frames of one map, cut into blocks in the order of the store.
 
     Args:
         where: The dataset's `extents`.
@@ -139,19 +173,75 @@ def blocks(
         least: Blocks that there should be, unless they would become very small.
         whole: Whether a part may be one block; else blocks are as small as they may be.
     """
-    chosen = [
-        each
-        for each in where.get(map_name, [])
-        if recordings is None or (recordings[0] <= each.recordings[1] and each.recordings[0] <= recordings[1])
-    ]
-    frames = sum(each.end - each.first for each in chosen)
+    return blocks_of(where, {map_name: recordings}, least=least, whole=whole)
+
+
+def blocks_of(
+    where: Mapping[str, list[Extent]],
+    chosen: Mapping[str, tuple[str, str] | None],
+    *,
+    least: int = 1,
+    whole: bool = True,
+) -> list[Block]:
+    """The frames of some maps, map by map, cut into blocks in the order of the store; one block may be of several maps.
+
+    Args:
+        where: The dataset's `extents`.
+        chosen: The maps, each with the first and the last recording to look at; None for all.
+        least: As of `blocks`.
+        whole: As of `blocks`.
+    """
+    runs: list[_Run] = []
+    for name, recordings in chosen.items():
+        for each in where.get(name, []):
+            if recordings is not None and (recordings[0] > each.recordings[1] or each.recordings[0] > recordings[1]):
+                continue
+            alone = len(chosen) > 1 and each.alone(recordings)
+            if alone and runs and runs[-1].ends_before(each):
+                runs[-1].maps.append((name, each.end))
+            else:
+                runs.append(_Run(each.part, each.first, [(name, each.end)], recordings, shared=alone))
+    frames = sum(run.end - run.first for run in runs)
     size = min(_MOST_FRAMES, max(_FEWEST_FRAMES, -(-frames // least))) if whole else _FEWEST_FRAMES
-    cut: list[Block] = []
-    for each in chosen:
-        count = -(-(each.end - each.first) // size)
-        ends = [each.first + (each.end - each.first) * n // count for n in range(count + 1)]
-        cut += [Block(map_name, each.part, low, high, recordings) for low, high in pairwise(ends)]
-    return cut
+    return [block for run in runs for block in run.blocks(size)]
+
+
+@dataclass(slots=True)
+class _Run:
+    """Rows of a part that follow each other.
+
+    Attributes:
+        part: The part.
+        first: The first row.
+        maps: The maps in the order of their rows, each with the row behind its last.
+        recordings: As of `Block`.
+        shared: Whether nothing but frames of these maps lies there, so that more may follow.
+    """
+
+    part: int
+    first: int
+    maps: list[tuple[str, int]]
+    recordings: tuple[str, str] | None
+    shared: bool
+
+    @property
+    def end(self) -> int:
+        """The row behind the last."""
+        return self.maps[-1][1]
+
+    def ends_before(self, extent: Extent) -> bool:
+        """Whether an extent of frames of one map alone follows."""
+        return self.shared and (self.part, self.end) == (extent.part, extent.first)
+
+    def blocks(self, size: int) -> Iterator[Block]:
+        """The rows cut into blocks of about that size."""
+        count = -(-(self.end - self.first) // size)
+        ends = [self.first + (self.end - self.first) * n // count for n in range(count + 1)]
+        ends_of_maps = [end for _, end in self.maps]
+        for low, high in pairwise(ends):
+            mine = self.maps[bisect_right(ends_of_maps, low) : bisect_left(ends_of_maps, high) + 1]
+            maps = tuple(name for name, _ in mine) if self.shared else ()
+            yield Block(mine[0][0], self.part, low, high, None if self.shared else self.recordings, maps=maps)
 
 
 def join_first(waiting: list[Block], most: int) -> Block:
@@ -163,11 +253,10 @@ def join_first(waiting: list[Block], most: int) -> Block:
     """
     first = waiting.pop(0)
     while waiting:
-        following = waiting[0]
-        alike = replace(following, first=first.first, end=first.end, runs=first.runs) == first
-        if not alike or following.first != first.end or following.end - first.first > min(most, _MOST_FRAMES):
+        joined = first.followed_by(waiting[0])
+        if joined is None or joined.end - joined.first > min(most, _MOST_FRAMES):
             break
-        first = replace(first, end=following.end, runs=(*first.runs, *following.runs))
+        first = joined
         waiting.pop(0)
     return first
 

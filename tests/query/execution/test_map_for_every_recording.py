@@ -1,0 +1,184 @@
+"""Recordings that have a map each are asked as datasets of one map each, and maps are read for candidates alone."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from dataclasses import replace
+
+import pytest
+
+from scenicq.errors import Source
+from scenicq.importers.ingest import ingest
+from scenicq.query.execution.option_texts import DRIVING, read_options
+from scenicq.query.execution.pieces import partitions
+from scenicq.query.execution.records import record
+from scenicq.query.execution.run import Query
+from scenicq.store.dataset import open_dataset
+from scenicq.store.regions import MapFiles
+
+COUNT = 7
+CROSSING, WITHOUT_LANES = 2, 4
+"""Maps that have what others have not, and lack what others have."""
+
+PROGRAMS = {
+    "beside the ego": "ego = new Car\nother = new Car at ego offset by Range(-2, 2) @ Range(3, 13)",
+    "along the road": "ego = new Car on road\nother = new Car on road, facing Range(-9, 9) deg",
+    "in the lane": "ego = new Car\nother = new Car on ego.lane\nrequire (distance to other) < 20",
+    "on a crossing": "ego = new Car\nother = new Car on crossing",
+    "at a hidden spot": "spot = new OrientedPoint on road\nego = new Car\nother = new Car ahead of spot by Range(0, 9)",
+    "recorded": "ego = new Car\nother = new Car ahead of ego by Range(0, 9)\nrecord (distance to other) as gap",
+    "comes near": "ego = new Car\nother = new Car\nrequire eventually (distance to other) < 12",
+}
+
+
+def _square(west, south, east, north):
+    corners = [[west, south], [east, south], [east, north], [west, north], [west, south]]
+    return {"type": "Polygon", "coordinates": [corners]}
+
+
+def _map(number):
+    at = 10.0 * number
+    features = [{"id": "land", "kind": "drivable", "shape": _square(at - 50, -50, at + 50, 90)}]
+    if number != WITHOUT_LANES:
+        for name, west, ends in (("up", at - 2, (-50, 90)), ("down", at - 6, (90, -50))):
+            line = [[west + 2, ends[0]], [west + 2, ends[1]]]
+            shape = _square(west, -50, west + 4, 90)
+            features.append({"id": name, "kind": "lane", "shape": shape, "centerline": [line]})
+    if number == CROSSING:
+        features.append({"id": "zebra", "kind": "crossing", "shape": _square(at - 9, 8, at + 9, 12)})
+    listed = [{"type": "Feature", "geometry": each.pop("shape"), "properties": each} for each in features]
+    return {"type": "FeatureCollection", "features": listed}
+
+
+def _dataset(folder, numbers, named=lambda number: f"map{number}"):
+    (folder / "maps").mkdir(parents=True)
+    header = {"name": "town", "interchange": 1, "angle": "heading", "classes": "scenic"}
+    (folder / "dataset.json").write_text(json.dumps(header))
+    lines = []
+    box = {"class": "Car", "heading": 0, "width": 2, "length": 4}
+    for number in numbers:
+        (folder / "maps" / f"{named(number)}.geojson").write_text(json.dumps(_map(number)))
+        for time in range(3):
+            other = {
+                **box,
+                "id": "o",
+                "track": "o",
+                "position": [10 * number - 4 * (number % 2), 6 + 3 * number - time],
+            }
+            other["heading"] = 3.14159 * (number % 2 if number != 5 else 0)
+            ego = {**box, "position": [10 * number, time]}
+            lines.append(
+                {"id": f"r{number}/{time}", "recording": f"r{number}", "timestamp_us": 500_000 * time,
+                 "map": named(number), "ego": ego, "objects": [other]}
+            )  # fmt: skip
+    (folder / "labels.jsonl").write_text("\n".join(map(json.dumps, lines)) + "\n")
+    ingest(folder, folder / "dataset")
+    return open_dataset(folder / "dataset")
+
+
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("alone")
+    return [_dataset(folder / str(number), [number]) for number in range(COUNT)]
+
+
+@pytest.fixture(scope="module")
+def together(tmp_path_factory):
+    return _dataset(tmp_path_factory.mktemp("together") / "all", range(COUNT))
+
+
+def _asked(dataset, program, **options):
+    query = Query(dataset, Source("p", program), read_options(model=DRIVING, **options))
+    found = [record(each) for each in query.results()]
+    return found, Counter(query.funnel.excluded), query.funnel.frames, query.funnel.candidates
+
+
+def _expected(alone, program, **options):
+    """What datasets of one map each give; of a map that the program does not fit, nothing."""
+    found, excluded, frames, candidates = [], Counter(), 0, 0
+    for dataset in alone:
+        try:
+            mine = _asked(dataset, program, **options)
+        except Exception as error:
+            if "map-lacks" not in str(error):
+                raise
+            excluded[f"map {dataset.maps[0]}"] += 3
+            frames += 3
+            continue
+        found += mine[0]
+        excluded += mine[1]
+        frames, candidates = frames + mine[2], candidates + mine[3]
+    return found, excluded, frames, candidates
+
+
+@pytest.mark.parametrize("options", [{}, {"prefilter": False}, {"ego": "any"}, {"all_matches": True}], ids=str)
+@pytest.mark.parametrize("program", PROGRAMS)
+@pytest.mark.one_in(4)
+def test_a_map_for_every_recording_gives_what_each_map_alone_does(alone, together, program, options):
+    expected = _expected(alone, PROGRAMS[program], **options)
+    assert _asked(together, PROGRAMS[program], **options) == expected
+    assert expected[0]
+
+
+@pytest.mark.parametrize("program", ["beside the ego", "along the road", "in the lane"])
+def test_frames_that_nobody_reads_proofs_of_are_the_same(alone, together, program):
+    options = read_options(model=DRIVING)
+    options = replace(options, proofs=False, reasons=False, interval_reasons=False)
+    found = [each.frame for each in Query(together, Source("p", PROGRAMS[program]), options).results()]
+    assert found == [each.frame for each in _expected(alone, PROGRAMS[program])[0]]
+
+
+def test_pieces_cut_blocks_of_several_maps(together):
+    source, options = Source("p", PROGRAMS["beside the ego"]), read_options(model=DRIVING)
+    whole = [record(each) for each in Query(together, source, options).results()]
+    for count in (2, 3, COUNT):
+        pieces = partitions(together, count)
+        found = [Query(together, source, options, piece.recordings).results() for piece in pieces]
+        assert [record(each) for results in found for each in results] == whole
+
+
+def test_maps_in_another_order_than_recordings(tmp_path, together):
+    """Results come map by map; blocks of several maps are of those that follow each other in the store, too."""
+    turned = _dataset(tmp_path / "turned", range(COUNT), lambda number: f"map{9 - number}")
+    for program in ("beside the ego", "in the lane"):
+        expected = _asked(together, PROGRAMS[program])[0]
+        found = _asked(turned, PROGRAMS[program])[0]
+        assert sorted(each.frame for each in found) == sorted(each.frame for each in expected)
+        assert [each.recording for each in found] == sorted((each.recording for each in found), reverse=True)
+
+
+def test_maps_are_read_when_a_candidate_needs_one(together, monkeypatch):
+    read: list[str] = []
+    features = MapFiles.features
+    monkeypatch.setattr(MapFiles, "features", lambda self, name: read.append(name) or features(self, name))
+    source = Source("p", f"{PROGRAMS['beside the ego']}, facing Range(-9, 9) deg relative to roadDirection")
+    ids = replace(read_options(model=DRIVING), proofs=False, reasons=False)
+    assert [each.frame for each in Query(together, source, ids).results()]
+    assert not read  # SQL has decided all of them
+    results = list(Query(together, source, read_options(model=DRIVING)).results())
+    assert set(read) == {f"map{each.recording[1:]}" for each in results} < set(together.maps)
+    assert len(read) == len(set(read))
+
+
+def test_a_dataset_that_says_nothing_of_its_maps_is_asked_alike(together, tmp_path):
+    earlier = _dataset(tmp_path / "earlier", range(COUNT))
+    file = earlier.path / "dataset.json"
+    content = json.loads(file.read_text())
+    assert {len(group["maps"]) for group in content["map_groups"]} == {1, COUNT - 2}
+    del content["map_groups"]
+    file.write_text(json.dumps(content))
+    earlier = open_dataset(earlier.path)
+    for program in PROGRAMS.values():
+        assert _asked(earlier, program) == _asked(together, program)
+
+
+@pytest.mark.parametrize("change", [{"directed": False}, {"kinds": ["lane"]}], ids=str)
+def test_what_a_manifest_says_of_maps_must_be_so(tmp_path, change):
+    dataset = _dataset(tmp_path / "lying", [0, 1])
+    file = dataset.path / "dataset.json"
+    content = json.loads(file.read_text())
+    content["map_groups"][0] |= change
+    file.write_text(json.dumps(content))
+    with pytest.raises(Exception, match="map map0 what its elements do not"):
+        open_dataset(dataset.path)
