@@ -69,6 +69,7 @@ bench: $(READY) ## Measure queries, start-up, ingest, pictures and what each ste
 	$(BIN)/python tests/bench/planted.py --page
 	$(BIN)/python tests/bench/steps.py
 	$(BIN)/python tests/bench/by_hand.py
+	$(BIN)/python tests/bench/maps.py
 	$(BIN)/python tests/bench/intervals_by_hand.py
 	$(BIN)/python tests/bench/intervals.py
 	$(BIN)/python tests/bench/verdicts.py record bench-results/verdicts.jsonl

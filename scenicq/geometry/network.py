@@ -73,32 +73,30 @@ class Network:
             traits: What is known of the features before they are read; None for nothing.
         """
         self.name = name
-        self._source = features if callable(features) else partial(tuple[MapFeature, ...], features)
+        self._read = _Read(features if callable(features) else partial(tuple[MapFeature, ...], features))
         self._traits = traits
         if not callable(features):
-            _ = self._kept
+            _ = self._read.kept
 
-    @cached_property
-    def _kept(self) -> tuple[dict[str, MapFeature], list[str]]:
-        """The features by id, and what is said of the others."""
-        kept: dict[str, MapFeature] = {}
-        repeated: list[str] = []
-        for feature in self._source():
-            if feature.id in kept:
-                repeated.append(f"{feature.kind} `{feature.id}`: the id is used before")
-            else:
-                kept[feature.id] = feature
-        return kept, repeated
-
-    @cached_property
+    @property
     def features(self) -> tuple[MapFeature, ...]:
         """What it is built from."""
-        return tuple(self._kept[0].values())
+        return self._read.features
 
     @property
     def is_read(self) -> bool:
         """Whether anything has asked for more than the map's traits."""
-        return "_kept" in vars(self)
+        return "kept" in vars(self._read)
+
+    @property
+    def parts(self) -> dict[str, object]:
+        """Itself, and what was made of it so far that can be had of any network, by names for `part`."""
+        made = {name: part for name, part in vars(self).items() if name.endswith("Region") or name == "roadDirection"}
+        return {"": self, **made, **self.otherRegions}
+
+    def part(self, name: str) -> object:
+        """A part by its name among the `parts` of a network with the same traits."""
+        return self if not name else self.otherRegions.get(name) or getattr(self, name)
 
     @cached_property
     def kinds(self) -> frozenset[str]:
@@ -109,32 +107,21 @@ class Network:
     @cached_property
     def problems(self) -> tuple[str, ...]:
         """Repeated ids (left out) and dangling references (passed over), as facts for the user."""
-        return (*self._kept[1], *(message for _, message in dangling(self.features)))
+        return (*self._read.kept[1], *(message for _, message in dangling(self.features)))
 
     @cached_property
     def roadDirection(self) -> RoadDirection:
         """The direction of traffic, where lanes overlap that of ways through intersections first, as Scenic has it."""
-        # elements are linked when a direction is asked for: many a program never does
         nowhere = None if self._traits is None else not self._traits.directed
         return DeferredDirection(
-            "roadDirection",
-            lambda: road_direction(self.features, self._ways),
-            nowhere=nowhere,
-            has_beside="shoulder" in self.kinds,
+            "roadDirection", self._read.direction, nowhere=nowhere, has_beside="shoulder" in self.kinds
         )
-
-    def _ways(self) -> list[str]:
-        """The lanes through intersections, in the order of their maneuvers."""
-        if "intersection" not in self.kinds:
-            return []
-        ways = (each.connectingLane for crossing in self.intersections for each in crossing.maneuvers)
-        return [lane.id for lane in ways if lane is not None]
 
     # --- elements
 
     @cached_property
     def _linked(self) -> Elements:
-        return link(self.features)
+        return self._read.linked
 
     @cached_property
     def lanes(self) -> tuple[Lane, ...]:
@@ -260,21 +247,18 @@ class Network:
     @cached_property
     def laneRegion(self) -> PolygonSet:
         """All lanes."""
-        return self._region("lane", ("lane",), lambda: self.roadDirection)
+        return self._region("lane", ("lane",), _always(self.roadDirection))
 
     @cached_property
     def roadRegion(self) -> PolygonSet:
         """The roads outside of intersections."""
-        return MapArea("road", self._roads, lambda: self.roadDirection, None if "road" in self.kinds else True)
-
-    def _roads(self) -> PolygonSet:
-        inside = {road.id for road in self.connectingRoads}
-        return _region_of([each for each in self.features if each.kind == "road" and each.id not in inside], "road")
+        empty = None if "road" in self.kinds else True
+        return MapArea("road", self._read.roads, _always(self.roadDirection), empty)
 
     @cached_property
     def intersectionRegion(self) -> PolygonSet:
         """All intersections."""
-        return self._region("intersection", ("intersection",), lambda: self.roadDirection)
+        return self._region("intersection", ("intersection",), _always(self.roadDirection))
 
     @cached_property
     def crossingRegion(self) -> PolygonSet:
@@ -284,12 +268,12 @@ class Network:
     @cached_property
     def sidewalkRegion(self) -> PolygonSet:
         """All sidewalks."""
-        return self._region("sidewalk", ("sidewalk",), lambda: self._along("sidewalk"))
+        return self._region("sidewalk", ("sidewalk",), self._along("sidewalk"))
 
     @cached_property
     def shoulderRegion(self) -> PolygonSet:
         """All shoulders."""
-        return self._region("shoulder", ("shoulder",), lambda: self._along("shoulder") or self.roadDirection)
+        return self._region("shoulder", ("shoulder",), self._along("shoulder", self.roadDirection))
 
     @cached_property
     def curbRegion(self) -> PolylineSet:
@@ -297,7 +281,9 @@ class Network:
 
         Scenic makes its curbs so from its lane groups. Those of groups inside intersections are no part of it.
         """
-        return DeferredPolylines("curb", self._curbs_everywhere)
+        # another network, as this one has the region
+        again = partial(Network, self.name, partial(_features_of, self._read), self._traits)
+        return DeferredPolylines("curb", lambda: again()._curbs_everywhere())
 
     def _curbs_everywhere(self) -> PolylineSet:
         lines = self._outer_curbs
@@ -308,16 +294,13 @@ class Network:
     @cached_property
     def drivableRegion(self) -> PolygonSet:
         """Lanes, roads, intersections and what the map calls drivable."""
-        return self._region("drivable", ("lane", "road", "intersection", "drivable"), lambda: self.roadDirection)
+        return self._region("drivable", ("lane", "road", "intersection", "drivable"), _always(self.roadDirection))
 
     @cached_property
     def walkableRegion(self) -> PolygonSet:
         """Sidewalks and crossings."""
-        return self._region(
-            "walkable",
-            ("sidewalk", "crossing"),
-            lambda: None if "crossing" in self.kinds else self.sidewalkRegion.orientation,
-        )
+        along = _always(None) if "crossing" in self.kinds else self._along("sidewalk")
+        return self._region("walkable", ("sidewalk", "crossing"), along)
 
     @cached_property
     def otherRegions(self) -> dict[str, PolygonSet]:
@@ -419,17 +402,78 @@ class Network:
             self._indices[kind] = PolygonSet(tuple(cast(Polygon, p) for p, _ in parts), kind), [i for _, i in parts]
         return self._indices[kind]
 
-    def _along(self, kind: str) -> RoadDirection | None:
-        """The direction of the centrelines of all elements of a kind, if the map gives them."""
-        return direction_along(self.features, kind) if kind in self.kinds else None
+    def _along(self, kind: str, otherwise: VectorField | None = None) -> Callable[[], VectorField | None]:
+        """What gives the direction of the centrelines of all elements of a kind, if the map gives them."""
+        read, there = self._read, kind in self.kinds
+        return lambda: (direction_along(read.features, kind) if there else None) or otherwise
 
     def _region(
-        self, name: str, kinds: tuple[str, ...], orientation: Callable[[], VectorField | None] = lambda: None
+        self, name: str, kinds: tuple[str, ...], orientation: Callable[[], VectorField | None] | None = None
     ) -> PolygonSet:
-        def make() -> PolygonSet:
-            return _region_of([feature for feature in self.features if feature.kind in kinds], name)
+        read = self._read
 
-        return MapArea(name, make, orientation, self.kinds.isdisjoint(kinds))
+        def make() -> PolygonSet:
+            return _region_of([feature for feature in read.features if feature.kind in kinds], name)
+
+        return MapArea(name, make, orientation or _always(None), self.kinds.isdisjoint(kinds))
+
+
+class _Read:
+    """What is read of a map, when something asks for it: a network's regions know this, and not the network.
+
+    So networks go when nobody has them any more, and not when somebody looks for circles.
+    """
+
+    def __init__(self, source: Callable[[], Iterable[MapFeature]]) -> None:
+        """Take what reads the features."""
+        self._source = source
+
+    @cached_property
+    def kept(self) -> tuple[dict[str, MapFeature], list[str]]:
+        """The features by id, and what is said of the others."""
+        kept: dict[str, MapFeature] = {}
+        repeated: list[str] = []
+        for feature in self._source():
+            if feature.id in kept:
+                repeated.append(f"{feature.kind} `{feature.id}`: the id is used before")
+            else:
+                kept[feature.id] = feature
+        return kept, repeated
+
+    @cached_property
+    def features(self) -> tuple[MapFeature, ...]:
+        """The features."""
+        return tuple(self.kept[0].values())
+
+    @cached_property
+    def linked(self) -> Elements:
+        """The elements that they make."""
+        return link(self.features)
+
+    def direction(self) -> RoadDirection:
+        """The direction of traffic, for which elements are linked when one is asked for: many a program never does."""
+        return road_direction(self.features, self._ways)
+
+    def _ways(self) -> list[str]:
+        """The lanes through intersections, in the order of their maneuvers."""
+        if not any(feature.kind == "intersection" for feature in self.features):
+            return []
+        crossings = self.linked.intersections.values()
+        ways = (each.connectingLane for crossing in crossings for each in crossing.maneuvers)
+        return [lane.id for lane in ways if lane is not None]
+
+    def roads(self) -> PolygonSet:
+        """The roads outside of intersections."""
+        inside = {road.id for road in self.linked.roads.values() if road.intersection is not None}
+        return _region_of([each for each in self.features if each.kind == "road" and each.id not in inside], "road")
+
+
+def _features_of(read: _Read) -> tuple[MapFeature, ...]:
+    return read.features
+
+
+def _always(direction: VectorField | None) -> Callable[[], VectorField | None]:
+    return lambda: direction
 
 
 def _region_of(features: Sequence[MapFeature], name: str) -> PolygonSet:

@@ -55,14 +55,15 @@ def fleet_map() -> tuple[MapFeature, ...]:
     """The crossing of `scenicq.geometry.default_street`, repeated in a grid."""
     features = street().features
     return tuple(
-        _moved(feature, f"{column}{row}-", column * PITCH_M, row * PITCH_M)
+        moved(feature, f"{column}{row}-", column * PITCH_M, row * PITCH_M)
         for column in range(TILES)
         for row in range(TILES)
         for feature in features
     )
 
 
-def _moved(feature: MapFeature, prefix: str, dx: float, dy: float) -> MapFeature:
+def moved(feature: MapFeature, prefix: str, dx: float, dy: float) -> MapFeature:
+    """An element of a map under another name, so many metres off."""
     properties: dict[str, Any] = dict(feature.properties)
     for key in LINES:
         if key in properties:

@@ -84,6 +84,11 @@ class CompiledMap:
         motion = not MOTION.isdisjoint(observed)
         return cls(scenario, network, plan, motion, observed, asked is not None, not network.is_read)
 
+    def over(self, scenario: Scenario, network: Network) -> CompiledMap:
+        """The same over another map of the same traits, given the scenario over that map."""
+        named = replace(scenario, map=network.name)
+        return replace(self, scenario=named, network=network, plan=replace(self.plan, map=network.name))
+
 
 @dataclass(frozen=True, slots=True)
 class Decided:

@@ -38,6 +38,7 @@ from scenicq.query.execution.never_compared import Coverage, coverage
 from scenicq.query.execution.program_files import SiblingFiles
 from scenicq.query.execution.recorded_columns import RecordedColumn, columns_of
 from scenicq.query.execution.results import Funnel, Result, up_to
+from scenicq.query.execution.scenario_copies import ScenarioCopies
 from scenicq.query.prefilter.executor import Block, Extent, blocks, blocks_of, extents, names, whole_recordings
 from scenicq.query.prefilter.plan import Plan
 from scenicq.recent import Recent
@@ -127,8 +128,9 @@ class _Known:
         compiled: The program over maps that it has read, and one of each of those that are alike.
         recent: The program over others of these.
         alike: The program over one of the maps with the same traits, where it asks for nothing else.
+        copies: What makes the program over others of these.
         lacking: What maps lack that the program needs.
-        looked: Whether this was asked of all maps.
+        scenarios: The program over all maps that it fits, one of those that are alike.
         extents: Where the frames of each map are.
         coverage: What is compared.
     """
@@ -136,8 +138,9 @@ class _Known:
     compiled: dict[str, CompiledMap] = field(default_factory=dict["str", CompiledMap])
     recent: Recent[str, CompiledMap] = field(default_factory=lambda: Recent(MAPS_KEPT))
     alike: dict[MapTraits, CompiledMap] = field(default_factory=dict[MapTraits, CompiledMap])
+    copies: dict[MapTraits, ScenarioCopies] = field(default_factory=dict[MapTraits, ScenarioCopies])
     lacking: dict[str, ScenarioError] = field(default_factory=dict["str", "ScenarioError"])
-    looked: bool = False
+    scenarios: list[Scenario] | None = None
     extents: dict[str, list[Extent]] | None = None
     coverage: Coverage | None = None
 
@@ -219,7 +222,15 @@ class Query:
         return compiled
 
     def _compile_map(self, map_name: str) -> CompiledMap:
-        options = self.options
+        options, known = self.options, self._known
+        traits = self.dataset.traits(map_name)
+        if traits in known.alike:
+            if traits not in known.copies:
+                first = known.alike[traits]
+                known.copies[traits] = ScenarioCopies(first.scenario, first.network)
+            network = self.dataset.network(map_name)
+            if (copied := known.copies[traits].over(network)) is not None:
+                return known.alike[traits].over(copied, network)
         scenario, network = self.compile(map_name)
         how = {"prefilter": options.prefilter, "proofs": options.proofs, "reasons": self._reasons(scenario)}
         return CompiledMap.of(scenario, network, options.match, **how)
@@ -248,9 +259,7 @@ class Query:
         """What maps lack that the program needs, by the map; an error if it fits none."""
         self._check_ego()
         known = self._known
-        if not known.looked:
-            self._scenarios()
-            known.looked = True
+        self._scenarios()
         lacking = known.lacking
         if lacking and len(lacking) == len(self.dataset.maps):
             wrong = (error for error in lacking.values() if error.diagnostics[0].code != "map-lacks")
@@ -259,6 +268,9 @@ class Query:
 
     def _scenarios(self, maps: Iterable[str] | None = None) -> list[Scenario]:
         """The scenario over the maps that it fits, one of those that are alike; arguments as of `fitting`."""
+        known = self._known
+        if maps is None and known.scenarios is not None:
+            return known.scenarios
         found: dict[int, Scenario] = {}
         for name in self.dataset.maps if maps is None else maps:
             try:
@@ -268,7 +280,10 @@ class Query:
                     raise
             else:
                 found.setdefault(id(scenario), scenario)
-        return list(found.values())
+        scenarios = list(found.values())
+        if maps is None:
+            known.scenarios = scenarios
+        return scenarios
 
     def misfits(self) -> list[Diagnostic]:
         """Warnings of the maps on which no frame can match, one for all that lack the same.
@@ -353,7 +368,10 @@ class Query:
             options: The options.
         """
         known = replace(
-            self._known, compiled={**self._known.compiled, map_name: compiled}, alike=dict(self._known.alike)
+            self._known,
+            compiled={**self._known.compiled, map_name: compiled},
+            alike=dict(self._known.alike),
+            scenarios=None,
         )
         options = replace(options, jobs=1, limit=None, every=False)
         chosen = {map_name: RecordingRange(recording, recording, self.dataset.manifest.by_recording[recording].frames)}

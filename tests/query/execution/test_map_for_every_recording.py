@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import gc
 import json
+import weakref
 from collections import Counter
 from dataclasses import replace
 
 import pytest
 
 from scenicq.errors import Source
+from scenicq.geometry.network import Network
 from scenicq.importers.ingest import ingest
+from scenicq.query.execution import block_matcher, run
 from scenicq.query.execution.option_texts import DRIVING, read_options
 from scenicq.query.execution.pieces import partitions
 from scenicq.query.execution.records import record
@@ -182,3 +186,27 @@ def test_what_a_manifest_says_of_maps_must_be_so(tmp_path, change):
     file.write_text(json.dumps(content))
     with pytest.raises(Exception, match="map map0 what its elements do not"):
         open_dataset(dataset.path)
+
+
+def test_networks_go_with_the_maps_that_are_not_kept(together, monkeypatch):
+    """A network in a circle would be there until somebody looks for circles, which is seldom."""
+    made: list[weakref.ref[Network]] = []
+    make = Network.__init__
+
+    def noted(self, *args):
+        make(self, *args)
+        made.append(weakref.ref(self))
+
+    monkeypatch.setattr(Network, "__init__", noted)
+    monkeypatch.setattr(run, "MAPS_KEPT", 2)
+    monkeypatch.setattr(block_matcher, "MAPS_KEPT", 2)
+    gc.collect()
+    gc.disable()
+    try:
+        query = Query(together, Source("p", PROGRAMS["along the road"]), read_options(model=DRIVING))
+        assert list(query.results())
+        assert len(made) > 4
+        # the two, and one for each kind of maps
+        assert sum(network() is not None for network in made) <= 2 + len(together.manifest.map_groups)
+    finally:
+        gc.enable()
