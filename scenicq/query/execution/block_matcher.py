@@ -232,9 +232,8 @@ class Decider:
     def _recordings(self, compiled: CompiledMap, block: Block) -> Decided:
         """Decide a block of whole recordings over time."""
         # takes long to load
-        from scenicq.query.execution.recording_matcher import Survivors  # noqa: PLC0415
+        from scenicq.query.execution.recording_matcher import DecidedRecordings, Survivors  # noqa: PLC0415
 
-        recordings = self._recording_matcher(block.map)
         connection, plan = self.connection, compiled.plan
         rows: CandidateRows | None = None
         # recordings are of one map
@@ -267,7 +266,9 @@ class Decider:
                 )  # fmt: skip
 
         left = Survivors(every[missed < 0], rows, plan.roles or (), read)
-        return Decided(missed, [], [], recordings.decide(block, left))
+        if not len(left.labels):
+            return Decided(missed, [], [], DecidedRecordings.nothing(block))
+        return Decided(missed, [], [], self._recording_matcher(block.map).decide(block, left))
 
     def _recorder(self, map_name: str) -> Recorder | None:
         """What works out what the program records; None where nobody reads that."""

@@ -62,6 +62,11 @@ class DecidedRecordings:
     failed: Counter[str] = field(default_factory=Counter[str])
     broken: Counter[str] = field(default_factory=Counter[str])
 
+    @classmethod
+    def nothing(cls, rows: Block) -> DecidedRecordings:
+        """Of a block of whole recordings in which nothing starts."""
+        return cls(counts=Counter(recordings=len(rows.runs)))
+
 
 @dataclass(frozen=True, slots=True)
 class Survivors:
@@ -173,7 +178,7 @@ class RecordingMatcher:
             rows: The block.
             left: Its labels that may be starts.
         """
-        found = DecidedRecordings(counts=Counter(recordings=len(rows.runs)))
+        found = DecidedRecordings.nothing(rows)
         if not len(left.labels):
             return found
         players = None if left.rows is None or self._whole else left.rows.rows

@@ -80,4 +80,4 @@ class _Reader(pickle.Unpickler):
     def persistent_load(self, pid: Any) -> object:
         """The part of the network, or the text."""
         what, which = cast("tuple[str, Any]", pid)
-        return self.sources[which] if what == "source" else self.network.part(which)
+        return self.sources[int(which)] if what == "source" else self.network.part(str(which))
