@@ -1,6 +1,7 @@
 """What is written about the commands and folders is complete."""
 
 import re
+import tomllib
 from pathlib import Path
 
 import click
@@ -10,6 +11,7 @@ from scenicq.limits import LIMITS
 from scenicq.match.options import MatchOptions
 from scenicq.store.classes import ROOT as ROOT_CLASS
 from scenicq.store.classes import ancestors, subclasses
+from scenicq.store.schema import SCHEMA_VERSION, UPGRADABLE
 from scenicq_cli.main import COMMANDS, cli
 
 ROOT = Path(__file__).parents[1]
@@ -57,7 +59,7 @@ def test_pages_for_users_name_only_options_that_there_are(page):
     assert set(re.findall(r"(?<![\w-])--[a-z][a-z0-9-]+", PAGES[page])) <= known
 
 
-OTHERS = {"scenicq/docs/CONTRIBUTING.md": {"--update-golden"}}
+OTHERS = {"scenicq/docs/CONTRIBUTING.md": {"--spec"}}
 """Options of other programs, by page."""
 
 
@@ -134,3 +136,34 @@ def test_every_make_target_is_explained():
     text = (ROOT / "Makefile").read_text()
     targets = set(re.search(r"\.PHONY: (.*)", text).group(1).split())
     assert targets == set(re.findall(r"^([a-z-]+):.*## ", text, re.MULTILINE))
+
+
+EVERYWHERE = [
+    ROOT / "README.md",
+    *(page for folder in ("cli", "sample_data", "scenicq", "tests") for page in sorted((ROOT / folder).rglob("*.md"))),
+]
+
+
+@pytest.mark.parametrize("page", EVERYWHERE, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_links_lead_to_files(page):
+    text = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
+    links = [link for link in re.findall(r"\]\(([^)\s]+)\)", text) if not re.match(r"https?:|#", link)]
+    assert [link for link in links if not (page.parent / link.partition("#")[0]).exists()] == []
+
+
+def test_the_page_of_licences_names_every_package():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    wanted = [
+        *project["dependencies"],
+        *(each for extra in project["optional-dependencies"].values() for each in extra),
+    ]
+    names = {re.match(r"[\w.-]+", each)[0] for each in wanted} - {"scenicq"}
+    told = set(re.findall(r"[\w.-]+\w", PAGES["scenicq/docs/licences.md"]))
+    assert names - told == set()
+
+
+def test_the_page_of_versions_says_what_becomes_of_each():
+    rows = dict(re.findall(r"^\| (\d+) \|(.*)\|$", PAGES["scenicq/docs/versions.md"], re.MULTILINE))
+    assert {int(number) for number in rows} == set(range(1, SCHEMA_VERSION + 1))
+    # what came with a version is in the row of that version, and what brings older datasets to it
+    assert {int(number) - 1 for number, text in rows.items() if "`scenicq index`" in text} == UPGRADABLE

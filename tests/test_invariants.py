@@ -268,8 +268,9 @@ def test_the_map_names_every_folder():
 
 def test_every_path_that_pages_for_contributors_name_exists():
     folders = "|".join(path.name for path in LIBRARY.iterdir() if path.is_dir())
-    for name, page in {"README.md": README, **DECISIONS}.items():
-        paths = re.findall(r"(?<![\w/.])((?:tests|scenicq|sample_data|cli)/[\w./]*[\w/])", page)
+    guides = {page.name: page.read_text() for page in (LIBRARY / "docs").glob("*.md")}
+    for name, page in [("the map", README), *DECISIONS.items(), *guides.items()]:
+        paths = re.findall(r"(?<![\w/.])((?:tests|scenicq|sample_data|cli)/[\w./-]*[\w/])", page)
         assert [path for path in paths if not (ROOT / path).exists()] == [], name
         inside = re.findall(rf"`((?:{folders})/(?:[\w/]+/|[\w/]+\.\w+|))`", page)
         assert [path for path in inside if not (LIBRARY / path).exists()] == [], name

@@ -1,8 +1,9 @@
 """Whether the package runs with the lowest and the newest versions of its dependencies, as pyproject.toml says.
 
-In an environment of its own, without pandas, the installed command answers as in the development environment, byte by
-byte; Parquet, whose bytes name the version that wrote them, row by row. The lowest versions are the lower bounds of
-`pyproject.toml`, which alone names them; those of extras must resolve.
+In an environment of its own, without pandas, the source archive (with the lowest) or the wheel (with the newest) is
+installed. Its command answers as in the development environment, byte by byte; Parquet, whose bytes name the version
+that wrote them, row by row. The lowest versions are the lower bounds of `pyproject.toml`, which alone names them; those
+of extras must resolve.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pyarrow.parquet as pq
+from archives import build_archives
 from packaging.requirements import Requirement
 
 ROOT = Path(__file__).parents[2]
@@ -100,12 +102,10 @@ def make_environment(folder: Path, *, lowest: bool, pre: bool) -> Path:
     bin_ = folder / ("Scripts" if os.name == "nt" else "bin")
     pip = (bin_ / "python", "-m", "pip", "--disable-pip-version-check")
     must(*pip, "install", "-q", "--prefer-binary", *["--pre"] * pre, *requirements(lowest))
-    with tempfile.TemporaryDirectory() as copy:
-        for name in ("pyproject.toml", "README.md", "LICENSE", "scenicq", "cli"):
-            source = ROOT / name
-            copied = shutil.copytree if source.is_dir() else shutil.copyfile
-            copied(source, Path(copy) / name)
-        must(*pip, "install", "-q", "--no-deps", copy)
+    with tempfile.TemporaryDirectory() as scratch:
+        archive, wheel = build_archives(Path(scratch))
+        # the one is installed from its own bytes, the other from those of the wheel that is made of it
+        must(*pip, "install", "-q", "--no-deps", archive if lowest else wheel)
     found = {each["name"].lower(): each["version"] for each in json.loads(must(*pip, "list", "--format", "json"))}
     assert "pandas" not in found, "pandas is what some packages need without saying so"
     must(*pip, "check")
