@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 import pytest
 
+from scenicq.errors import CODES
 from scenicq.limits import LIMITS
 from scenicq.match.options import MatchOptions
 from scenicq.store.classes import ROOT as ROOT_CLASS
@@ -85,9 +86,30 @@ def _class_tree():
     return "\n".join([*lines, ""])
 
 
+_BLOCK = re.compile(r"^```scenic[^\n]*\n(.*?)^```", re.DOTALL | re.MULTILINE)
+
+
+def _codes():
+    """Each code with its meaning, and the shortest program of the pages of the language that shows it."""
+    shown = {}
+    for page in sorted((ROOT / "tests" / "language").glob("*.md")):
+        for block in _BLOCK.finditer(page.read_text(encoding="utf-8")):
+            for code in re.findall(r"# (?:error|warning|note): \[([a-z-]+)\]", block[1]):
+                shown.setdefault(code, []).append((len(block[1]), page.name, block[1]))
+    parts = []
+    for code, meaning in CODES.items():
+        part = f"### {code}\n\n{meaning[0].upper()}{meaning[1:]}.\n"
+        if code in shown:
+            _, name, program = min(shown[code])
+            part += f"\n```scenic\n{program}```\n\nFrom [{name.removesuffix('.md')}](../../tests/language/{name}).\n"
+        parts.append(part)
+    return "\n".join(parts)
+
+
 @pytest.mark.parametrize(
     ("page", "start", "end", "written"),
     [
+        ("scenicq/docs/codes.md", "<!-- codes: `make golden` writes this -->\n", "<!-- end of codes -->", _codes),
         ("cli/README.md", "<!-- commands: `make golden` writes this -->\n", "<!-- end of commands -->", _reference),
         (
             "tests/language/world-model.md",

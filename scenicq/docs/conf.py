@@ -43,7 +43,13 @@ CONTENTS = {
             if not page.stem.startswith(("README", "cookbook"))
         ),
     ],
-    "Reference": ["scenicq/docs/api", "scenicq/importers/README", "scenicq/limits", "scenicq/evaluate/README"],
+    "Reference": [
+        "scenicq/docs/api",
+        "scenicq/docs/codes",
+        "scenicq/importers/README",
+        "scenicq/limits",
+        "scenicq/evaluate/README",
+    ],
     "Contributing": [
         "scenicq/docs/CONTRIBUTING",
         "scenicq/README",
