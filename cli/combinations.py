@@ -40,7 +40,7 @@ def check_combination(ctx: click.Context, given: Mapping[str, object]) -> None:
     """Refuse options that do not go together.
 
     Args:
-        ctx: Of the command.
+        ctx: The command's context.
         given: The value of each option by its name; what is None or false is not given.
 
     Raises:
@@ -58,8 +58,8 @@ def check_over_time(ctx: click.Context, given: Mapping[str, object], is_over_tim
     """Refuse options that are about frames where intervals are looked for.
 
     Args:
-        ctx: Of the command.
-        given: As of `check_combination`.
+        ctx: The command's context.
+        given: As `check_combination` has it.
         is_over_time: Whether intervals are looked for; asked where it matters.
 
     Raises:

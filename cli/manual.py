@@ -60,11 +60,11 @@ class Manual(click.Command):
         """Take what the help says besides what click knows.
 
         Args:
-            args: Of click's command.
+            args: What click's command takes.
             arguments: What each argument is, by the name that the usage shows.
             exits: Meaning of 0 and 1; the other codes mean the same everywhere.
             topics: Names of options (as parameters) by the heading that they stand under, those of no topic first.
-            attributes: Of click's command.
+            attributes: What click's command takes by name.
         """
         super().__init__(*args, **attributes)
         self.arguments = arguments

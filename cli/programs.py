@@ -68,7 +68,7 @@ def given_program(
     """The program and the other arguments of a command whose program may be an option.
 
     Args:
-        ctx: Of the command, for its usage.
+        ctx: The command's context, for its usage.
         text: The program itself, where it is given.
         words: The arguments in the order of the command's: the program, unless it is an option, and the others.
         needed: How many of the others must be there.

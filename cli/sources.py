@@ -43,7 +43,7 @@ def remember(folder: Path, source: Path) -> None:
     A home that cannot be written costs no more than that.
 
     Args:
-        folder: Of the dataset.
+        folder: The dataset's folder.
         source: What it was made from.
     """
     with contextlib.suppress(OSError, RuntimeError):
@@ -60,8 +60,8 @@ def note_sound(place: Place, manifest: Manifest) -> None:
     """Note that a dataset need not be looked at again as long as its files stay as they are.
 
     Args:
-        place: Of the dataset.
-        manifest: Of the dataset.
+        place: Where the dataset is.
+        manifest: The dataset's manifest.
     """
     with contextlib.suppress(OSError, RuntimeError):
         _sound().add(place, manifest)

@@ -34,7 +34,7 @@ class Frames:
     """The frames of a dataset, in its order.
 
     Attributes:
-        names: Of the frames.
+        names: The frames' names.
         numbers: Number of each name.
         recordings: Names of the recordings.
         recording: Number of the recording of each frame, shape (n,).

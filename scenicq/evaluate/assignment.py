@@ -108,7 +108,7 @@ def assign(pairs: Pairs, rank: Numbers, objects: int, threshold_m: float, *, nea
 
     Args:
         pairs: Near pairs.
-        rank: Of each prediction, 0 the first, shape (predictions,).
+        rank: The rank of each prediction, 0 the first, shape (predictions,).
         objects: How many label objects there are.
         threshold_m: Pairs at this distance or more do not count.
         nearest_only: Whether a prediction whose nearest object is taken, however far that is, gets no other.

@@ -85,7 +85,7 @@ class GroupDensity:
 
     Attributes:
         group: The group, over the scenario as it is written.
-        draws: Of hidden variables.
+        draws: The draws of hidden variables.
         fixed: Features without any random variable.
         reason: What could not be computed last.
     """

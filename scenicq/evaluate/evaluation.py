@@ -77,7 +77,7 @@ class ScenarioEvaluation:
     """The figures of one scenario.
 
     Attributes:
-        name: Of the scenario.
+        name: The scenario's name.
         matching, other, undecided: Numbers of frames: of the last nobody knows whether they match.
         roles: How often the objects of each role are missed, against others of their classes that are alike in
             distance and visibility.
@@ -158,7 +158,7 @@ def evaluate(
     """Judge a model's detections on the frames that match, against the other frames.
 
     Args:
-        results: Of one scenario, or of several by their names.
+        results: Those of one scenario, or of several by their names.
         dataset: The dataset that the results are of.
         predictions: What the model has detected, or a file of it.
         distance_m: Centre distance within which an object counts as found: 0.5, 1, 2 or 4; for some classes another

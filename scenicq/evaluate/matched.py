@@ -30,7 +30,7 @@ class Played:
     """The label objects that play one role.
 
     Attributes:
-        name: Of the role.
+        name: The role's name.
         objects: Their numbers, each once, shape (n,).
     """
 
@@ -43,7 +43,7 @@ class Matched:
     """The frames of a dataset as one query divides them.
 
     Attributes:
-        name: Of the scenario.
+        name: The scenario's name.
         matching: Frames that match, shape (frames,).
         decided: Frames that match or do not; the others are unknown.
         settled: Frames of which nothing is unknown: there are no more correspondences than those that are said.
@@ -81,7 +81,7 @@ def read_matched(
     what is unknown.
 
     Args:
-        name: Of the scenario.
+        name: The scenario's name.
         records: Results for frames, or for intervals (whose roles are played by tracks).
         frames: The dataset's.
         objects: Its label objects.

@@ -26,7 +26,7 @@ class Simulated:
     """A scenario in simulation and on recordings.
 
     Attributes:
-        share: Of the simulated runs that failed.
+        share: The share of the simulated runs that failed.
         about: What it was compared with on recordings, such as "role parkedCar".
         says: "for" the failure in reality, "against" it, or "too little".
         sentence: The same in words.
@@ -96,7 +96,7 @@ def verdict(share: Share, real: ObjectComparison) -> Simulated:
     where they are not missed more often by the margin: a low rate alone is no evidence.
 
     Args:
-        share: Of the simulated runs that failed.
+        share: The share of the simulated runs that failed.
         real: The comparison on recordings.
     """
     says = _SAYS[real.says]

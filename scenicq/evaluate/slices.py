@@ -37,7 +37,7 @@ class Slice:
     Attributes:
         by: What divides them.
         part: Which part.
-        share: Of the part's objects that were missed.
+        share: The share of the part's objects that was missed.
         other: The same among the other objects; None where that makes no sense.
         source: What the program says at the place `by` of a random variable; "" of anything else.
     """

@@ -37,10 +37,10 @@ def log_weights(log_density: Reals, values: Reals, finite: Sequence[Hashable], s
     """Logarithms of the weights of frames, which are 1 in the mean; shape (n,).
 
     Args:
-        log_density: Of the program at the values of each frame, up to a constant, shape (n,); finite.
-        values: Of the continuous random variables, shape (n, variables).
+        log_density: The program's log-density at the values of each frame, up to a constant, shape (n,); finite.
+        values: Those of the continuous random variables, shape (n, variables).
         finite: What the frame has of features without a density; frames count as neighbours where it is the same.
-        seed: Of the choice of frames that the estimate is made of, where there are many.
+        seed: Chooses the frames that the estimate is made of, where there are many.
     """
     count = len(log_density)
     if not count:

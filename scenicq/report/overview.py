@@ -84,7 +84,7 @@ def funnel_section(funnel: Funnel, cut: str) -> str:
     """How many frames are left after each step.
 
     Args:
-        funnel: Of a query whose results were taken.
+        funnel: The funnel of a query whose results were taken.
         cut: What the results leave out; "" where they are complete.
     """
     recordings = funnel.over_time["recordings"]

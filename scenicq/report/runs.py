@@ -22,7 +22,7 @@ class FrameRun:
         results: Their results in order of time, at least one.
         first: Number of the first frame in its recording, from 1.
         of: Frames of the recording.
-        timeline: Of an interval, a picture of what held when.
+        timeline: A picture of what held when in an interval.
     """
 
     recording: str

@@ -39,7 +39,7 @@ def tile(run: FrameRun, number: int, best: int, picture: str) -> str:
 
     Args:
         run: The run.
-        number: Of the run, from 1.
+        number: The run's number, from 1.
         best: Index of its best frame.
         picture: Markup of the small picture.
     """

@@ -24,7 +24,7 @@ def interval_runs(query: Query, results: Iterable[Result], numbers: dict[str, tu
 
     Args:
         query: The query.
-        results: Of intervals.
+        results: Intervals.
         numbers: As `scenicq.report.runs.frame_numbers` gives them.
     """
     for result in results:

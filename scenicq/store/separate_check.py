@@ -1,4 +1,4 @@
-"""A dataset looked at in a process of its own, which may die where a library does on what it reads."""
+"""Check a dataset in a process of its own: a damaged file may make a library kill the process."""
 
 from __future__ import annotations
 
