@@ -1,4 +1,4 @@
-"""Which options of `scenicq match` go together: one table of what needs what, and of what excludes what."""
+"""Which options of `scenicq match` can be combined: one table of what needs what, and of what excludes what."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _FRAMES_ONLY = ("advise",)
 
 
 def check_combination(ctx: click.Context, given: Mapping[str, object]) -> None:
-    """Refuse options that do not go together.
+    """Refuse options that cannot be combined.
 
     Args:
         ctx: The command's context.

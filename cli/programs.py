@@ -47,7 +47,7 @@ LANES = click.option(
 
 
 def read_scenario(path: str | Path) -> Source:
-    """The program of a file, or of standard input for `-`.
+    """Read the program from a file, or from standard input for `-`.
 
     Raises:
         DataError: file-missing; file-invalid where it is not UTF-8 text; option-invalid where it lies elsewhere.
@@ -65,7 +65,7 @@ def read_scenario(path: str | Path) -> Source:
 def given_program(
     ctx: click.Context, text: str | None, words: Sequence[str | None], needed: int = 0
 ) -> tuple[Source, list[str | None], str | None]:
-    """The program and the other arguments of a command whose program may be an option.
+    """Tell the program from the other arguments, where the program may be an option.
 
     Args:
         ctx: The command's context, for its usage.

@@ -128,7 +128,7 @@ class ObjectComparison:
 
     @property
     def says(self) -> Says:
-        """What the recordings say of the objects in question."""
+        """The verdict of the recordings on the objects in question."""
         p_value = self.p_value if math.isnan(self.p_corrected) else self.p_corrected
         if self.missing:
             return "too little"
@@ -138,7 +138,7 @@ class ObjectComparison:
 
     @property
     def because(self) -> str:
-        """Why it says too little; "" where it does not."""
+        """Why there is no verdict; "" where there is one."""
         if self.says != "too little":
             return ""
         low, high = (100 * end for end in self.interval)
@@ -150,7 +150,7 @@ class ObjectComparison:
 
     @property
     def beside(self) -> str:
-        """Whom the objects in question are set beside, in words."""
+        """Where the compared objects were found, in words."""
         places = ("of the same frame", "of the same recording", f"of the same {self.unit}", "elsewhere")
         told = [
             f"{number:,} beside others {place}" for number, place in zip(self.places, places, strict=True) if number

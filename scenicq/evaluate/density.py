@@ -1,4 +1,4 @@
-"""How typical labels are of a program: the density with which it would generate what they observe.
+"""How typical labels are of a program: the density with which it generates what they observe.
 
 The density of a label is the product over groups of jointly dependent features (given the label's values of other
 features, as in algorithm 1 of the query paper). In a group, variables in which its features are affine are solved for;
@@ -63,7 +63,7 @@ _Draw = Callable[[Leaf, tuple[Data, ...]], Data]
 
 
 class GroupValues(NamedTuple):
-    """What a group says of labels.
+    """The densities of labels in a group.
 
     Attributes:
         log, error: Logarithms of the densities of the features and their standard errors, shape (labels,); -inf outside
@@ -297,7 +297,7 @@ class GroupDensity:
         return tuple((weight / total, option) for weight, option in zip(index.weights, choice.options, strict=True))
 
     def _affine(self, columns: ObservedColumns, dimension: int) -> tuple[list[Array], list[list[Array]]]:
-        """The features where all solved variables are 0, and by how much they change with each."""
+        """The features as affine functions: their values where all solved variables are 0, and the change with each."""
         base = self._at(columns, [np.zeros((1, 1))] * dimension)
         matrix: list[list[Array]] = []
         for place in range(dimension):

@@ -1,4 +1,4 @@
-"""Predictions joined with the labels of a dataset: what counts by the rules of the benchmark, and what was found."""
+"""Join predictions with the labels of a dataset: what counts by the benchmark's rules, and what was found."""
 
 from __future__ import annotations
 

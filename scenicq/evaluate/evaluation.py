@@ -1,4 +1,4 @@
-"""A model's detections judged on the frames of a scenario: the whole of it, from files to figures.
+"""Judge a model's detections on the frames of a scenario, from files to figures.
 
 The query paper's figure 1: a model failed on a scenario in simulation; does it fail on the real frames that match?
 """
@@ -235,7 +235,7 @@ def _name_of(results: Results) -> str:
 
 
 def _doubt(name: str, results: Results, said: Completeness) -> Iterator[Diagnostic]:
-    """A warning where results do not say of every frame whether it matches."""
+    """Warn where results do not say of every frame whether it matches."""
     if said.summary is None and not isinstance(results, Path | RemotePath | str):
         return  # who hands them over knows
     told = "other frames count as those that do not match"
@@ -271,7 +271,7 @@ def _records(results: Results, doubts: list[Diagnostic]) -> Iterator[Record | Su
 
 
 def _own(name: str, records: Iterable[Record], dataset: Dataset, doubts: list[Diagnostic]) -> Iterator[Record]:
-    """The records, once it is sure that they do not name another dataset; another version of it is a doubt."""
+    """Read the records, and refuse those of another dataset; another version of the dataset is a warning."""
     mine = name_origin(dataset)
     seen: set[str] = set()
     for each in records:
@@ -289,7 +289,7 @@ def _decisive(scenario: ScenarioEvaluation) -> ObjectComparison:
 
 
 def _corrected(found: list[ScenarioEvaluation]) -> list[ScenarioEvaluation]:
-    """With the p-values of all rows of all scenarios corrected together."""
+    """Correct the p-values of all rows of all scenarios together."""
     rows = [[*one.roles, one.all_objects] for one in found]
     corrected = iter(holm(np.array([each.p_value for some in rows for each in some])).tolist())
     done: list[ScenarioEvaluation] = []

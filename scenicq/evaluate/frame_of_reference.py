@@ -1,4 +1,4 @@
-"""Whether predictions lie in the frame of reference that their format says: that of the map, or that of the ego."""
+"""Check that predictions lie in the frame of reference of their format: the map's, or the ego's."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a query has found, by frame of the dataset: which frames match, who plays which role, with which values."""
+"""The results of a query by frame of the dataset: which frames match, with which objects and values."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class Matched:
 
     @property
     def free(self) -> Bools:
-        """Frames that match in which who is in no role surely can play none, shape (frames,)."""
+        """Frames that match, and whose objects without a role surely can play none, shape (frames,)."""
         return self.matching & self.settled if self.every else np.zeros(len(self.matching), dtype=np.bool_)
 
 

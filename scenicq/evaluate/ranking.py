@@ -1,4 +1,4 @@
-"""Matches from typical to borderline, and matches that spread over recordings and random variables."""
+"""Rank matches from typical to borderline, and pick matches that spread over recordings and random variables."""
 
 from __future__ import annotations
 
@@ -151,7 +151,7 @@ def densities(query: Query, results: Sequence[Result]) -> list[LogDensity | None
 
 
 def rank_results(query: Query, results: Iterable[Result]) -> list[Result]:
-    """Results from typical to borderline, each with its log-density; what has none comes last, in its order.
+    """Sort results from typical to borderline, each with its log-density; those without one come last, in their order.
 
     Args:
         query: The query that found them.
@@ -168,7 +168,7 @@ def rank_results(query: Query, results: Iterable[Result]) -> list[Result]:
 
 
 def sample_plain(results: Sequence[Result], count: int, seed: int = 0) -> list[Result]:
-    """Some matches at random, in their order.
+    """Pick matches at random, and keep their order.
 
     Args:
         results: Matches.
@@ -182,7 +182,7 @@ def sample_plain(results: Sequence[Result], count: int, seed: int = 0) -> list[R
 
 
 def sample_diverse(results: Sequence[Result], count: int) -> list[Result]:
-    """Some matches that spread over recordings and over values of the program's random variables, in their order.
+    """Pick matches that spread over recordings and over values of the random variables, and keep their order.
 
     Recordings take turns; of each, the match is taken that is farthest from those that are taken already, in the
     numbers of its witness, each scaled to its range, and in time.

@@ -1,4 +1,4 @@
-"""What chance can do, over clusters of frames that resemble each other: recordings, or drives of several.
+"""Intervals and tests over clusters of frames that resemble each other: recordings, or drives of several.
 
 A share has the interval of Wilson (1927) at its effective number of objects: how many would vary as much as the share
 varies over clusters (Korn and Graubard 1998, "Confidence intervals for proportions with small expected number of

@@ -244,7 +244,7 @@ _UNITS = {"translation": "m", "scale": "1 - IoU", "orientation": "rad", "velocit
 
 
 def overview(evaluation: Evaluation) -> Table:
-    """What answers the question, of all scenarios in one table."""
+    """The answers of all scenarios in one table."""
     simulated = any(each.simulated is not None for each in evaluation.scenarios)
     rows: list[tuple[str, ...]] = []
     for one in evaluation.scenarios:
@@ -267,7 +267,7 @@ def frame_counts(scenario: ScenarioEvaluation) -> str:
 
 
 def tables(scenario: ScenarioEvaluation, within: FoundWithin) -> list[Table]:
-    """What people look at: roles, each class at its centre distance, slices."""
+    """The tables for people: roles, each class at its centre distance, slices."""
     found: list[Table] = [
         (
             "missed",

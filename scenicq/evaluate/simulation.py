@@ -1,4 +1,4 @@
-"""What a simulator has said of a scenario, beside what recordings say."""
+"""Compare simulated runs of a scenario with recordings."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Simulated:
 
 
 def read_simulated(path: Path) -> Mapping[str, Share]:
-    """The failure rate of each scenario in a CSV file of runs.
+    """Read the failure rate of each scenario from a CSV file of runs.
 
     Args:
         path: With the columns `scenario`, and `failed` (1 or 0, true or false) or `score` (the share missed in that
@@ -90,7 +90,7 @@ def _share(values: NDArray[np.float64]) -> Share:
 
 
 def verdict(share: Share, real: ObjectComparison) -> Simulated:
-    """Whether recordings bear out what was simulated.
+    """Say whether recordings bear out what was simulated.
 
     They speak for it where objects in question are missed more often than others that are alike (p < 0.05), against it
     where they are not missed more often by the margin: a low rate alone is no evidence.

@@ -39,7 +39,7 @@ class Slice:
         part: Which part.
         share: The share of the part's objects that was missed.
         other: The same among the other objects; None where that makes no sense.
-        source: What the program says at the place `by` of a random variable; "" of anything else.
+        source: The program's text at the place `by` of a random variable; "" for anything else.
     """
 
     by: str
@@ -62,7 +62,7 @@ class Slice:
 def slices(
     detection: Detection, matched: Matched, missed: Bools, mine: Bools, others: Bools, cluster: Numbers
 ) -> tuple[Slice, ...]:
-    """All slices with at least two parts, whose intervals hold all together in 95 % (Bonferroni).
+    """Make all slices with at least two parts; their intervals hold all together in 95 % (Bonferroni).
 
     Args:
         detection: Labels and predictions.

@@ -1,4 +1,4 @@
-"""Frames spread as a program spreads its scenes: how much each frame that matches counts.
+"""Weight frames that match so that they spread as the program spreads its scenes.
 
 The frames of a dataset that match are not spread as the program would draw them: some gaps, some roads are more
 frequent on the way. A frame counts by the density with which the program generates its values of random variables, over
@@ -75,7 +75,7 @@ def log_weights(log_density: Reals, values: Reals, finite: Sequence[Hashable], s
 
 @dataclass(frozen=True, slots=True)
 class Weighted:
-    """How often objects are missed where frames are spread as the program spreads its scenes.
+    """The share of objects missed, were frames spread as the program spreads its scenes.
 
     Attributes:
         about: Which objects, such as "role parkedCar".
@@ -106,7 +106,7 @@ class Weighted:
 
 
 def weigh(about: str, missed: Bools, log_weight: Reals, cluster: NDArray[np.int64]) -> Weighted:
-    """The share of some objects that was missed, each counting by its weight.
+    """Work out the weighted share of objects that was missed.
 
     Args:
         about: Which objects.

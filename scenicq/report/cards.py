@@ -1,4 +1,4 @@
-"""One run of frames as a card of the report: a picture with a slider, and what is said of each frame."""
+"""A run of frames as a card of the report: a picture with a slider, and facts about each frame."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def _inline(card: Card) -> str:
 
 
 def best_frame(run: FrameRun, shots: Sequence[Shot]) -> int:
-    """Index of the frame in which the farthest of the roles is nearest to the ego, of equal ones the middle one.
+    """Choose the frame in which the farthest role is nearest to the ego; of equal ones the middle one.
 
     Args:
         run: The run.

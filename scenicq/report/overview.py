@@ -171,7 +171,7 @@ def _shown(name: str, value: Any) -> str:
 
 
 def how_section(query: Query, command: str, elapsed_s: float) -> str:
-    """How to get this report again: the command line, the options, the versions, the dataset.
+    """The section that says how to make this report again: command line, options, versions, dataset.
 
     Args:
         query: The query.
