@@ -30,7 +30,7 @@ _EXCLUDES = {
     ("shard", "sort"): "",
     ("rank", "sort"): "",
 }
-"""Two options that cannot be had together, and what to do instead."""
+"""Two options that cannot be combined, and what to do instead."""
 
 _FRAMES_ONLY = ("advise",)
 """Options that mean nothing where intervals are looked for."""
@@ -51,7 +51,7 @@ def check_combination(ctx: click.Context, given: Mapping[str, object]) -> None:
             raise click.UsageError(message, ctx)
     for (option, other), instead in _EXCLUDES.items():
         if given.get(option) and given.get(other):
-            raise click.UsageError(f"--{option} cannot be had with --{other}{instead}", ctx)
+            raise click.UsageError(f"--{option} cannot be combined with --{other}{instead}", ctx)
 
 
 def check_over_time(ctx: click.Context, given: Mapping[str, object], is_over_time: Callable[[], bool]) -> None:
@@ -67,4 +67,4 @@ def check_over_time(ctx: click.Context, given: Mapping[str, object], is_over_tim
     """
     for option in _FRAMES_ONLY:
         if given.get(option) and is_over_time():
-            raise click.UsageError(f"--{option} is about frames: it cannot be had with intervals", ctx)
+            raise click.UsageError(f"--{option} is about frames: it cannot be combined with intervals", ctx)

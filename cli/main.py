@@ -34,7 +34,7 @@ COMMANDS = {
     "gather": "Put the shards of a query together, in the order of the dataset.",
     "check": "Say whether a scenario is sound, and how it is read.",
     "sample": "Draw scenes from a scenario, as labels.",
-    "explain": "Say why a frame or recording matches, or what keeps it from it and what would do.",
+    "explain": "Say why a frame or recording matches, or what prevents it and which change would make it match.",
     "show": "Draw one frame from above: map, boxes, and what a scenario says of it.",
     "evaluate": "Say whether a model fails on the frames that match.",
     "report": "Say which matches came, went and stayed between two result files.",

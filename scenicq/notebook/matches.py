@@ -131,7 +131,7 @@ class FrameResult(_Origin):
         )
 
     def explain(self) -> DisplayedText:
-        """Why the frame or interval matches, or what keeps it from it."""
+        """Say why the frame or interval matches, or what prevents it."""
         if self.result.interval is None:
             return self.matches.explain(self.frame)
         query = self.matches.query
@@ -294,7 +294,7 @@ class Matches(Sequence[FrameResult]):
         return Shot(label, world.scenario, verdict, why), self._backdrop(label)
 
     def explain(self, frame: str) -> DisplayedText:
-        """Why a frame or a recording matches, or what keeps it from it and what would do.
+        """Say why a frame or recording matches, or what prevents it and which change would make it match.
 
         Args:
             frame: The name of any frame of the dataset; over time also of a recording, and after `@` when the interval
