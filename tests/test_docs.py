@@ -98,7 +98,7 @@ def _codes():
                 shown.setdefault(code, []).append((len(block[1]), page.name, block[1]))
     parts = []
     for code, meaning in CODES.items():
-        part = f"### {code}\n\n{meaning[0].upper()}{meaning[1:]}.\n"
+        part = f"## {code}\n\n{meaning[0].upper()}{meaning[1:]}.\n"
         if code in shown:
             _, name, program = min(shown[code])
             part += f"\n```scenic\n{program}```\n\nFrom [{name.removesuffix('.md')}](../../tests/language/{name}).\n"
