@@ -162,6 +162,13 @@ def test_the_page_of_matches_explains_every_reason_of_an_unknown():
     assert [reason for reason in short if reason not in page] == []
 
 
+def test_the_glossary_is_short_and_in_order():
+    parts = PAGES["scenicq/docs/glossary.md"].split("\n## ")[1:]
+    words = [re.findall(r"^\| (.+?) \|", part, re.MULTILINE)[1:] for part in parts]
+    assert all(part == sorted(part, key=str.lower) for part in words)
+    assert 40 <= sum(map(len, words)) <= 60
+
+
 def test_every_make_target_is_explained():
     text = (ROOT / "Makefile").read_text()
     targets = set(re.search(r"\.PHONY: (.*)", text).group(1).split())
