@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from statistics import NormalDist
 from typing import Literal
@@ -31,6 +31,7 @@ __all__ = [
     "DISTANCES_M",
     "MARGIN",
     "MISSES",
+    "Groups",
     "ObjectComparison",
     "Says",
     "Share",
@@ -164,6 +165,21 @@ class ShareComparison:
         return f"{text}: {told[self.says]}"
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Groups:
+    """Who is set beside whom, by numbers of objects.
+
+    Attributes:
+        own: Objects in question that are compared, shape (n,).
+        others: Those that they are set beside, shape (m,).
+        weight: How much each other counts, 1 in all, shape (m,).
+    """
+
+    own: Numbers
+    others: Numbers
+    weight: Reals
+
+
 @dataclass(frozen=True, slots=True)
 class ObjectComparison(ShareComparison):
     """Objects in question against others.
@@ -177,22 +193,59 @@ class ObjectComparison(ShareComparison):
         alone: Share of them to which no other is alike.
         places: How many of the objects in question are set beside others of each of `PLACES`.
         uncounted: How many more objects would be in question, but for the rules of the benchmark.
+        groups: Who is set beside whom; None where nobody is.
     """
 
     asked: int = 0
     alone: float = 0.0
     places: tuple[int, ...] = (0,) * len(PLACES)
     uncounted: int = 0
+    groups: Groups | None = field(default=None, compare=False, repr=False)
 
     @property
     def beside(self) -> str:
         """Whom the objects in question are set beside, in words."""
+        without = self.asked - sum(self.places)
+        return f"{self.about}: {', '.join([*self._places(), *([f'{without:,} without others'] if without else [])])}"
+
+    def _places(self) -> list[str]:
         places = ("of the same frame", "of the same recording", f"of the same {self.unit}", "elsewhere")
-        told = [
+        return [
             f"{number:,} beside others {place}" for number, place in zip(self.places, places, strict=True) if number
         ]
+
+    def finding(self, undecided: int) -> str:
+        """What was found, with what certainty, against which controls, and what was not looked at, in one sentence.
+
+        Args:
+            undecided: Frames of which nobody knows whether they match.
+        """
+        if math.isnan(self.share.rate):
+            return self.sentence
+        whom = "others that are alike"
+        points = f"{100 * abs(self.difference):.0f} points"
+        told = {
+            "worse": f"missed {points} more often than {whom}",
+            "better": f"missed {points} less often than {whom}",
+            "no worse": f"missed no more often than {whom}, to {100 * self.margin:g} points",
+            "too little": f"whether they are missed more often than {whom} cannot be told: {self.because}",
+        }[self.says]
+        certainty: list[str] = []
+        if not math.isnan(self.interval[0]):
+            low, high = (100 * end for end in self.interval)
+            certainty.append(f"95 % interval {low:+.0f} to {high:+.0f} points")
+        if not math.isnan(self.p_value):
+            certainty.append(p_text(self.p_value if math.isnan(self.p_corrected) else self.p_corrected))
+        certainty.append(f"{self.recordings} {self.unit}{'s' if self.recordings != 1 else ''}")
         without = self.asked - sum(self.places)
-        return f"{self.about}: {', '.join([*told, *([f'{without:,} without others'] if without else [])])}"
+        left = [
+            *([f"{without:,} of {self.asked:,} objects, to which no other is alike"] if without else []),
+            *([f"{self.uncounted:,} that do not count by the rules of the benchmark"] if self.uncounted else []),
+            *([f"{undecided:,} undecided frames"] if undecided else []),
+        ]
+        controls = f"; {', '.join(self._places())}" if sum(self.places) else ""
+        rest = f"not looked at: {', '.join(left)}" if left else "nothing was left out"
+        return f"{self.about}: {told} ({', '.join(certainty)}){controls}; {rest}"
 
     @property
     def sentence(self) -> str:
@@ -276,7 +329,7 @@ def _compared(
     def by_cluster(values: Reals | Bools) -> Reals:
         return sums_by(like.cluster, values, count)
 
-    number = int(found.compared.sum())
+    number, others = int(found.compared.sum()), np.flatnonzero(found.weight > 0)
     own = found.compared / number
     of, of_others = by_cluster(own), by_cluster(found.weight)
     first, difference = float(own @ lost), float(found.difference @ lost)
@@ -330,6 +383,7 @@ def _compared(
         alone=1 - number / asked,
         missing=missing,
         places=found.places,
+        groups=Groups(np.flatnonzero(found.compared), others, found.weight[others]),
         margin=margin,
         unit=unit,
         more=clusters_to_tell(design * independent, effective, clusters, *needed) if misses else None,

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.errors import DataError, Diagnostic
+from scenicq.evaluate.balance import Balance, balance
 from scenicq.evaluate.benchmark import BenchmarkFigures, benchmark_figures
 from scenicq.evaluate.classes import ClassFigures, class_figures
 from scenicq.evaluate.clusters import find_clusters, parameters_of
@@ -96,6 +97,7 @@ class ScenarioEvaluation:
             the program spreads its scenes; empty where the results are not ranked.
         classes: Figures of each class, on frames that match and on the others.
         slices: Shares missed by what objects and frames are like.
+        balances: How alike those who are compared are, for each of `headline` in which anybody is.
         worst: Frames that match, the worst first.
         simulated: The scenario in simulation; None without.
         missed: Whether each label object was missed, for pictures.
@@ -113,6 +115,7 @@ class ScenarioEvaluation:
     weighted: tuple[Weighted, ...]
     classes: tuple[ClassFigures, ...]
     slices: tuple[Slice, ...]
+    balances: tuple[Balance, ...]
     worst: tuple[WorstFrame, ...]
     simulated: Simulated | None
     missed: Bools
@@ -483,6 +486,7 @@ class _Judge:
         )
         of_all, coincident = self._of_all(here, there)
         others = free & self._of_classes(in_roles)
+        balances = (balance(each, detection, self._parameters) for each in roles or (of_all,))
         return ScenarioEvaluation(
             name=matched.name,
             matching=int(matching.sum()),
@@ -497,6 +501,7 @@ class _Judge:
                 for figures in class_figures(detection, group, frames, self._clusters.number, self._weights, self.least)
             ),
             slices=slices(detection, matched, self.missed, in_roles, others, self._like.cluster),
+            balances=tuple(each for each in balances if each is not None),
             worst=tuple(self._worst(matching, in_roles)),
             simulated=None,
             missed=self.missed,
@@ -567,10 +572,14 @@ class _Judge:
 
     def _compare(self, about: str, mine: Bools, others: Bools, like: Likeness) -> ObjectComparison:
         used = np.flatnonzero(mine | others)
-        return compare(
+        found = compare(
             about, self.missed[used], mine[used], others[used], like.taken(used), self._rng,
             margin=self._margin, unit=self._clusters.unit,
         )  # fmt: skip
+        if found.groups is None:
+            return found
+        own, beside = used[found.groups.own], used[found.groups.others]
+        return replace(found, groups=replace(found.groups, own=own, others=beside))
 
     def _worst(self, matching: Bools, mine: Bools) -> Iterator[WorstFrame]:
         detection = self.detection

@@ -12,7 +12,7 @@ from scenicq.errors import Diagnostic
 from scenicq.evaluate.comparison import Share
 from scenicq.evaluate.detection import Detection
 from scenicq.evaluate.evaluation import Evaluation, ModelsEvaluation, ScenarioEvaluation, WorstFrame
-from scenicq.evaluate.rows import Table, frame_counts, models_table, overview, tables
+from scenicq.evaluate.rows import Table, balance_table, frame_counts, models_table, overview, tables
 from scenicq.geometry.boxes import corners
 from scenicq.geometry.camera import box_corners, box_edges
 from scenicq.report.backdrop import Backdrop
@@ -104,6 +104,12 @@ def _whiskers(share: Share, other: Share | None) -> str:
                    aria_hidden="true")  # fmt: skip
 
 
+def _dots(own: float, others: float) -> str:
+    """Two shares, one over the other: the objects in question, then the others."""
+    unknown = (math.nan, math.nan)
+    return _whiskers(Share(math.nan, math.nan, own, unknown), Share(math.nan, math.nan, others, unknown))
+
+
 def _counted(count: int, what: str, several: str) -> str:
     return f"{count} {what if count == 1 else several}"
 
@@ -187,7 +193,11 @@ class _Model:
 
     def _scenario(self, each: ScenarioEvaluation) -> Iterator[str]:
         counts = frame_counts(each)
-        sentences = [element("p", element("b", escape(role.sentence))) for role in each.headline]
+        sentences = [element("p", element("b", escape(role.finding(each.undecided)))) for role in each.headline]
+        for one in each.balances:
+            graphs = [_dots(own, others) for covariate in one.covariates for _, own, others in covariate.parts]
+            sentences.append(_table(balance_table(one), graphs))
+        sentences += [element("p", escape(role.sentence)) for role in each.headline]
         sentences += [element("p", escape(one.beside), class_="hint") for one in each.headline if one.asked]
         sentences += [element("p", escape(one.sentence)) for one in each.weighted]
         if each.simulated is not None:

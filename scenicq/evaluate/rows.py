@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from scenicq.evaluate.balance import Balance
 from scenicq.evaluate.benchmark import BenchmarkFigures
 from scenicq.evaluate.classes import ClassFigures
 from scenicq.evaluate.comparison import ObjectComparison, Share, ShareComparison, p_text
@@ -20,6 +21,7 @@ from scenicq.evaluate.weighting import Weighted
 __all__ = [
     "COLUMNS",
     "Table",
+    "balance_table",
     "evaluation_record",
     "flat_rows",
     "models_record",
@@ -166,6 +168,23 @@ def _benchmark(each: BenchmarkFigures) -> dict[str, Any]:
     }
 
 
+def _balance(each: Balance) -> dict[str, Any]:
+    return {
+        "about": each.about,
+        "covariates": [
+            {
+                "by": one.by,
+                "mean": _number(one.means[0]),
+                "mean_of_others": _number(one.means[1]),
+                "standardized_difference": _number(one.apart),
+                "in_common": one.common,
+                "parts": [{"part": name, "share": own, "share_of_others": others} for name, own, others in one.parts],
+            }
+            for one in each.covariates
+        ],
+    }
+
+
 def _slice(each: Slice) -> dict[str, Any]:
     others = None if each.other is None else _share(each.other)
     source = {"source": each.source} if each.source else {}
@@ -201,11 +220,13 @@ def _scenario(each: ScenarioEvaluation) -> dict[str, Any]:
         "matching_frames": each.matching,
         "other_frames": each.other,
         "undecided_frames": each.undecided,
+        "findings": [one.finding(each.undecided) for one in each.headline],
         "roles": [_comparison(role) for role in each.roles],
         "all_objects": _comparison(each.all_objects),
         "weighted": [_weighted(one) for one in each.weighted],
         "classes": [_figures(figures) for figures in each.classes],
         "slices": [_slice(part) for part in each.slices],
+        "balance": [_balance(one) for one in each.balances],
         "worst_frames": [
             {"frame": one.frame, "recording": one.recording, "missed": one.missed, "of": one.of, "false": one.false}
             for one in each.worst
@@ -337,6 +358,20 @@ def models_table(found: ModelsEvaluation) -> Table:
                  corrected, recordings, says)  # fmt: skip
         rows.append((each.scenario, *cells) if several else cells)
     return "models, each beside those before it", ("SCENARIO", *head) if several else head, rows
+
+
+def balance_table(each: Balance) -> Table:
+    """How alike the objects in question and those beside them are."""
+    rows: list[tuple[str, ...]] = []
+    for one in each.covariates:
+        spread = f"{one.by}: {100 * one.common:.0f} % in common"
+        if not math.isnan(one.means[0]):
+            spread += f", means {one.means[0]:.1f} and {one.means[1]:.1f} m"
+        if not math.isnan(one.apart):
+            spread += f", {abs(one.apart):.2f} standard deviations apart"
+        for number, (name, own, others) in enumerate(one.parts):
+            rows.append((spread if number == 0 else "", name, _percent(own), _percent(others)))
+    return f"{each.about} and those beside it: how alike they are", ("WHAT", "PART", "IN QUESTION", "OTHERS"), rows
 
 
 def _points(each: ShareComparison) -> str:

@@ -217,7 +217,8 @@ def test_pages(judged: Evaluation, street: Dataset, tmp_path: Path) -> None:
     assert text.index('id="frame-0-0"') < text.index('id="frame-0-1"')
     assert f'href="#frame-0-0">{worst.frame}<' in text
     assert "1 false box<" in text
-    drawn = 2 + len(judged.scenarios[0].slices)
+    (balance,) = judged.scenarios[0].balances
+    drawn = 2 + len(judged.scenarios[0].slices) + sum(len(each.parts) for each in balance.covariates)
     assert text.count('class="whiskers"') == drawn
     assert text.count('class="own rate"') == drawn
     assert "Scenarios" not in text
