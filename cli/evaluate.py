@@ -89,7 +89,8 @@ _EXTENSIONS = {".json": "json"}
               help="What a frame without detections is: an error, a frame in which nothing was found, or left out.")
 @click.option("--simulated", metavar="FILE", type=LOCAL_PATH,
               help="Simulated runs to set beside it: CSV with `scenario` (the name of a results file) and `failed` or "
-              "`score` (the share missed, 0 to 1).")
+              "`score` (the share missed, 0 to 1). Where `recording` or `frame` says what a run rebuilds, both are "
+              "compared pair by pair, too, and simulation narrows the interval as far as it foretells what is missed.")
 @click.option("--cluster", metavar="KEY",
               help="What errors may go by: recordings with one value of this parameter count as one, such as those of "
               f"a drive; or `recording`.  [default: the first of {', '.join(CLUSTER_KEYS)} that all frames have, else "

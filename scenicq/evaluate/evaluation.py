@@ -26,8 +26,9 @@ from scenicq.evaluate.controls import Likeness, number_of
 from scenicq.evaluate.detection import DISTANCES, Detection, FoundWithin, Missing, detect
 from scenicq.evaluate.matched import Matched, read_matched
 from scenicq.evaluate.paired_models import PairedComparison, compare_pair
+from scenicq.evaluate.paired_runs import pair_runs
 from scenicq.evaluate.resampling import holm, resamples
-from scenicq.evaluate.simulation import Simulated, read_simulated, verdict
+from scenicq.evaluate.simulation import Simulated, SimulatedRuns, read_simulated, verdict
 from scenicq.evaluate.slices import Slice, slices
 from scenicq.evaluate.weighting import Weighted, weigh
 from scenicq.importers.prediction_checks import find_doubts
@@ -264,7 +265,7 @@ def evaluate_models(
             message = f"{simulated} has no run of {', '.join(missing_runs)}"
             hint = f"it has {', '.join(sorted(runs))}; a scenario is called after its file of results"
             raise DataError(Diagnostic("file-invalid", message, hints=(hint,)))
-        found = [replace(each, simulated=verdict(runs[each.name], _decisive(each))) for each in found]
+        found = [any_judge.beside_runs(each, runs[each.name], str(simulated)) for each in found]
     models: dict[str, Evaluation] = {}
     warnings = list(doubts)
     for number, (name, judge) in enumerate(judges.items()):
@@ -523,6 +524,34 @@ class _Judge:
                 about, self.missed, before.missed, both, self._like.cluster, self._rng, margin=self._margin,
                 unit=self._clusters.unit,
             )  # fmt: skip
+
+    def beside_runs(self, scenario: ScenarioEvaluation, runs: SimulatedRuns, name: str) -> ScenarioEvaluation:
+        """A scenario beside its simulated runs, pair by pair where they name recordings.
+
+        Raises:
+            DataError: file-invalid: a run rebuilds what the dataset does not have.
+        """
+        real = _decisive(scenario)
+        frames, clusters = self.detection.frames, self._clusters.number
+        of_scene = {name: int(clusters[number]) for name, number in frames.numbers.items()}
+        for number, recording in zip(clusters.tolist(), frames.recording.tolist(), strict=True):
+            of_scene[frames.recordings[recording]] = number
+        if strange := [each for each in runs.rebuilt if each and each not in of_scene]:
+            message = f"{name}: a run rebuilds `{strange[0]}`, which is no recording and no frame of the dataset"
+            raise DataError(Diagnostic("file-invalid", message))
+        paired = None
+        if real.groups is not None and any(runs.rebuilt):
+            # a run that rebuilds nothing is of a scene of its own
+            scenes = [each or f"\0{number}" for number, each in enumerate(runs.rebuilt)]
+            paired = pair_runs(
+                runs.failed,
+                np.array([of_scene.get(each, -1) for each in runs.rebuilt], dtype=np.int64),
+                np.unique(scenes, return_inverse=True)[1].astype(np.int64),
+                self.missed[real.groups.own],
+                self._like.cluster[real.groups.own],
+                self._clusters.unit,
+            )
+        return replace(scenario, simulated=verdict(runs, real, paired))
 
     def frames(self, matched: Matched) -> tuple[Bools, Bools]:
         """The frames that match, and those that do not, of those that predictions speak of."""

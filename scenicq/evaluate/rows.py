@@ -14,6 +14,7 @@ from scenicq.evaluate.controls import PLACES
 from scenicq.evaluate.detection import FoundWithin
 from scenicq.evaluate.evaluation import Evaluation, ModelsEvaluation, ScenarioEvaluation
 from scenicq.evaluate.paired_models import PairedComparison
+from scenicq.evaluate.paired_runs import PairedRuns
 from scenicq.evaluate.precision import ERRORS
 from scenicq.evaluate.slices import Slice
 from scenicq.evaluate.weighting import Weighted
@@ -168,6 +169,23 @@ def _benchmark(each: BenchmarkFigures) -> dict[str, Any]:
     }
 
 
+def _paired(each: PairedRuns) -> dict[str, Any]:
+    rate, (low, high) = each.adjusted
+    return {
+        "pairs": each.pairs,
+        "without_runs": each.without,
+        "unit": each.unit,
+        "missed": _share(each.real),
+        "failed": each.simulated,
+        "difference": each.difference,
+        "difference_low": _number(each.interval[0]),
+        "difference_high": _number(each.interval[1]),
+        "explained": _number(each.explained),
+        "with_control_variate": {"rate": _number(rate), "low": _number(low), "high": _number(high)},
+        "sentence": each.sentence,
+    }
+
+
 def _balance(each: Balance) -> dict[str, Any]:
     return {
         "about": each.about,
@@ -235,7 +253,8 @@ def _scenario(each: ScenarioEvaluation) -> dict[str, Any]:
     if each.simulated is not None:
         simulated = each.simulated
         found["simulated"] = {
-            "failed": _share(simulated.share), "says": simulated.says, "sentence": simulated.sentence
+            "failed": _share(simulated.share), "says": simulated.says, "sentence": simulated.sentence,
+            "paired": None if simulated.paired is None else _paired(simulated.paired),
         }  # fmt: skip
     return found
 
