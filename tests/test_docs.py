@@ -8,7 +8,7 @@ import click
 import pytest
 
 from scenicq.errors import CODES
-from scenicq.limits import LIMITS
+from scenicq.limits import LIMITS, Beyond, limits
 from scenicq.match.options import MatchOptions
 from scenicq.store.classes import ROOT as ROOT_CLASS
 from scenicq.store.classes import ancestors, subclasses
@@ -152,6 +152,21 @@ def test_help_fits_a_page_and_has_every_section():
 )
 def test_limits_are_those_that_the_page_names(sentence, limit):
     assert sentence.format(limit) in " ".join(PAGES["scenicq/docs/limits.md"].split())
+
+
+def test_the_page_of_matches_explains_every_reason_of_an_unknown():
+    page = " ".join(PAGES["scenicq/docs/matching.md"].partition("is unknown\n")[2].replace("`", "").split())
+    reasons = {each.more for each in limits() if each.beyond is Beyond.UNDECIDED} | {"unobserved"}
+    assert len(reasons) > 10
+    short = {reason.removesuffix(" to tell apart").removeprefix("too many ") for reason in reasons}
+    assert [reason for reason in short if reason not in page] == []
+
+
+def test_the_glossary_is_short_and_in_order():
+    parts = PAGES["scenicq/docs/glossary.md"].split("\n## ")[1:]
+    words = [re.findall(r"^\| (.+?) \|", part, re.MULTILINE)[1:] for part in parts]
+    assert all(part == sorted(part, key=str.lower) for part in words)
+    assert 40 <= sum(map(len, words)) <= 60
 
 
 def test_every_make_target_is_explained():

@@ -329,6 +329,15 @@ def test_each_question_of_a_stranger_is_answered_in_three_files_at_most():
     assert asked >= QUESTIONS
 
 
+def test_the_places_of_what_is_new_are_there():
+    table = SECTIONS["Where to look"].partition("What is new")[2]
+    told = re.findall(r"`([\w/]+\.py)` \(`(\w+)`", table)
+    assert len(told) > 5
+    for file, name in told:
+        path = ROOT / file if file.startswith("cli/") else LIBRARY / file
+        assert name in defined(path), (file, name)
+
+
 def imports(file: Path) -> set[str]:
     """The modules of the library that a file imports."""
     return {

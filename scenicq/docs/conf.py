@@ -29,7 +29,10 @@ root_doc = "README"
 CONTENTS = {
     "Using it": [
         "scenicq/docs/README",
-        *(f"scenicq/docs/{name}" for name in ("matching", "results", "evaluation", "data", "long-runs", "limits")),
+        *(
+            f"scenicq/docs/{name}"
+            for name in ("matching", "glossary", "results", "evaluation", "data", "long-runs", "limits")
+        ),
         "cli/README",
         "sample_data/README",
         "scenicq/docs/compared",

@@ -44,12 +44,7 @@ class FrameRun:
 
 
 def frame_numbers(dataset: Dataset, recordings: Iterable[str]) -> dict[str, tuple[int, int]]:
-    """For each frame of some recordings its number there, from 1, and how many frames the recording has.
-
-    Args:
-        dataset: The dataset.
-        recordings: Names of recordings.
-    """
+    """For each frame of some recordings its number there, from 1, and how many frames the recording has."""
     wanted = sorted(set(recordings))
     connection = dataset.connect()
     try:

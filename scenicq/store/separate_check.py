@@ -17,9 +17,6 @@ _MEMORY = 6 << 30
 def check_apart(dataset: DatasetReference) -> None:
     """Refuse a dataset that is not sound, or that ends the process which reads it.
 
-    Args:
-        dataset: The dataset.
-
     Raises:
         DataError: As `DatasetReference.open` does.
     """
