@@ -114,7 +114,7 @@ def slopes(times_us: NDArray[np.int64], values: Numbers, tracks: Sequence[str | 
     """Fit a line to the values around each sample: its slope a second, nan where the track has too few samples.
 
     The samples are those of the track that have a value, equally many on both sides, as long as there are any. Values
-    near the end of all numbers have no slope that is one.
+    near the largest floats may have no finite slope.
     """
     known = np.flatnonzero(~np.isnan(values))
     track = track_numbers(tracks)[known]
