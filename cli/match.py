@@ -43,7 +43,7 @@ from .output import ProgressBar, choose_format
 from .path_type import ANY_PATH, chosen_file
 from .pieces import LateShardError, Shard, parse_shard, run_shard
 from .plan import show_plan
-from .programs import LANES, MAP_DEFAULTS, PROGRAM_TEXT, SCENARIO, given_program
+from .programs import LANES, MAP_DEFAULTS, PARAMS, PROGRAM_TEXT, RUN_SCENARIO, SCENARIO, given_program
 from .remarks import remarks, show_remarks
 from .report import count, show
 from .sources import SENSORS
@@ -84,6 +84,8 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @click.argument("scenario", metavar="SCENARIO", type=click.Path(), required=False)
 @click.argument("dataset", metavar="DATASET", type=click.Path(), required=False)
 @PROGRAM_TEXT
+@RUN_SCENARIO
+@PARAMS
 @click.option("--tolerance", metavar="LIST",
               help="How far labels may be off, in metres, deg or rad: position=, heading=, speed= and so on; "
               "for some objects ego.heading=15deg, Pedestrian.position=0.5; a bare size for all; or `exact`, 1e-3.  "

@@ -16,7 +16,16 @@ from scenicq.store.remote_path import local_path
 from .options import option_type
 from .path_type import check_here
 
-__all__ = ["LANES", "MAP_DEFAULTS", "PROGRAM_TEXT", "SCENARIO", "given_program", "read_scenario"]
+__all__ = [
+    "LANES",
+    "MAP_DEFAULTS",
+    "PARAMS",
+    "PROGRAM_TEXT",
+    "RUN_SCENARIO",
+    "SCENARIO",
+    "given_program",
+    "read_scenario",
+]
 
 SCENARIO = "A Scenic program, as a file; `-` is standard input. Not with -e."
 """What the help says of the argument."""
@@ -44,6 +53,25 @@ LANES = click.option(
     "60 degrees of its heading, and all where none does or it has no heading; any, all of them.",
 )
 """The option for the lanes of an object; see `compile_scenario`."""
+
+
+RUN_SCENARIO = click.option(
+    "--scenario",
+    "run_scenario",
+    metavar="NAME",
+    help="Which scenario of a program with several runs.  [default: Main, or the only one]",
+)
+"""The option for the scenario that runs; see `compile_scenario`."""
+PARAMS = click.option(
+    "-p",
+    "--param",
+    "params",
+    metavar="NAME VALUE",
+    nargs=2,
+    multiple=True,
+    help="Give a global parameter a value, whatever the program says: a number or a text. Can be given several times.",
+)
+"""The option for parameters; see `compile_scenario`."""
 
 
 def read_scenario(path: str | Path) -> Source:
