@@ -194,25 +194,26 @@ def _track_measure(node: Measure, courses: tuple[CoursePlace, ...]) -> float:
     return low
 
 
-def directions(field: Value, point: Value, going: Value = None) -> tuple[float, ...] | Undefined:
+def directions(field: Value, point: Value, going: Value = None, last: Value = None) -> tuple[float, ...] | Undefined:
     """The headings that a vector field allows at a point, at least one; `Undefined` where it has none.
 
     Args:
         field: The field.
         point: The point.
         going: The heading of who is there, where it matters; None if there is none.
+        last: The last lane of its track likewise.
 
     Raises:
         CannotEvaluate: If they are no field and no point.
     """
-    for arg in (field, point, going):
+    for arg in (field, point, going, last):
         if isinstance(arg, Undefined):
             return arg
     if kind_of_value(field) != "field" or not isinstance(point, tuple):
         raise CannotEvaluate(f"the direction of {field!r} at {point!r}")
     x, y = point
     if isinstance(field, ElementAtPoint) and isinstance(going, float):
-        return (field.along(x, y, going),)
+        return (field.along(x, y, going, last if isinstance(last, float) else math.nan),)
     allowed = cast(VectorField, field).values(x, y)
     name = getattr(field, "name", "the field")
     return allowed or Undefined(f"`{name}` is undefined at ({x:.2f}, {y:.2f})")

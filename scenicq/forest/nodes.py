@@ -25,7 +25,7 @@ from scenicq.geometry.network import Network
 from scenicq.geometry.regions import Region
 
 __all__ = [
-    "CLOCK", "COURSE", "ELEMENT", "GIVEN", "GOING", "IDENTITY", "MIRRORED", "PAST", "RANK", "TRACK", "WHO",
+    "CLOCK", "COURSE", "ELEMENT", "GIVEN", "GOING", "IDENTITY", "LAST_LANE", "MIRRORED", "PAST", "RANK", "TRACK", "WHO",
     "Among", "AmongOp", "Arithmetic", "ArithmeticOp", "Bearing", "Body", "Compare", "CompareOp", "Constant", "Contains",
     "Coordinate", "Corridor", "CourseCoordinate", "DirectionAt", "DiscAt", "DiscreteRange", "Distance", "Encloses",
     "Feature", "Identity", "Index", "Intersects", "Kind", "LaneCourse", "Leaf", "Logic", "LogicOp", "Measure", "Node",
@@ -54,6 +54,8 @@ COURSE = "driven course"
 """The property of an object that is its course; no program can give one of such a name."""
 GOING = "way it goes"
 """The property of an object that tells its lanes from others at its place: its heading, None where a label has none."""
+LAST_LANE = "last lane"
+"""The property of an object that does so where its heading does not: the number of its track's last lane, or None."""
 CLOCK = "time of the sample"
 """The property of any object that is the time of a sample, in seconds from a moment of its recording."""
 PAST = "past value of "
@@ -300,7 +302,8 @@ class DirectionAt(_Scalar):
     """The heading of a vector field at a point; where the field allows several, any of them.
 
     Attributes:
-        going: Which way goes who is there, where that tells which of several elements is meant; else empty.
+        going: Which way goes who is there and the last lane of its track, where that tells which of several elements is
+            meant; else empty.
     """
 
     field: Node
