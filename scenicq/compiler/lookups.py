@@ -27,7 +27,7 @@ from scenicq.geometry.occupancy import ElementAtPoint
 if TYPE_CHECKING:
     from scenicq.compiler.interpreter import Interpreter
 
-__all__ = ["among", "look_up", "look_up_of", "look_up_ways"]
+__all__ = ["among", "going_of", "look_up", "look_up_of", "look_up_ways"]
 
 
 def look_up_of(run: Interpreter, owner: Instance, name: str, reject: ModelValue, span: Span) -> ModelValue:
@@ -43,14 +43,19 @@ def look_up_of(run: Interpreter, owner: Instance, name: str, reject: ModelValue,
     Raises:
         ScenarioError: As `look_up`.
     """
-    going: tuple[Node, ...] = ()
-    if run.lanes == "along" and LOOKUPS[name][0] == "lane" and owner.index is not None:
-        if GOING not in owner.properties:
-            owner.properties[GOING] = to_heading(owner, span)
-            # who is in a scene has been nowhere before
-            owner.properties[LAST_LANE] = build.constant(None, span)
-        going = tuple(to_node(property_node(owner, name, span), span) for name in (GOING, LAST_LANE))
+    going = going_of(run, owner, span) if LOOKUPS[name][0] == "lane" else ()
     return look_up(run, run.network, name, owner, reject, span, going)
+
+
+def going_of(run: Interpreter, owner: Instance, span: Span) -> tuple[Node, ...]:
+    """Which way an object goes and the last lane of its track; nothing where all lanes are its own."""
+    if run.lanes == "any" or owner.index is None:
+        return ()
+    if GOING not in owner.properties:
+        owner.properties[GOING] = to_heading(owner, span)
+        # who is in a scene has been nowhere before
+        owner.properties[LAST_LANE] = build.constant(None, span)
+    return tuple(to_node(property_node(owner, name, span), span) for name in (GOING, LAST_LANE))
 
 
 def look_up(

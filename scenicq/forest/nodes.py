@@ -26,11 +26,12 @@ from scenicq.geometry.regions import Region
 
 __all__ = [
     "CLOCK", "COURSE", "ELEMENT", "GIVEN", "GOING", "IDENTITY", "LAST_LANE", "MIRRORED", "PAST", "RANK", "TRACK", "WHO",
-    "Among", "AmongOp", "Arithmetic", "ArithmeticOp", "Bearing", "Body", "Compare", "CompareOp", "Constant", "Contains",
-    "Coordinate", "Corridor", "CourseCoordinate", "DirectionAt", "DiscAt", "DiscreteRange", "Distance", "Encloses",
-    "Feature", "Identity", "Index", "Intersects", "Kind", "LaneCourse", "Leaf", "Logic", "LogicOp", "Measure", "Node",
-    "Norm", "Normal", "PointIn", "Range", "RectangleAt", "RegionDifference", "RegionIntersection", "RegionUnion",
-    "Rotate", "Scale", "SectorAt", "Select", "TruncatedNormal", "Undefined", "Value", "Vector", "VectorOf", "VectorSum",
+    "AheadInLanes", "Among", "AmongOp", "Arithmetic", "ArithmeticOp", "Bearing", "Body", "Compare", "CompareOp",
+    "Constant", "Contains", "Coordinate", "Corridor", "CourseCoordinate", "DirectionAt", "DiscAt", "DiscreteRange",
+    "Distance", "Encloses", "Feature", "Identity", "Index", "Intersects", "Kind", "LaneCourse", "Leaf", "Logic",
+    "LogicOp", "Measure", "Node", "Norm", "Normal", "PointIn", "Range", "RectangleAt", "RegionDifference",
+    "RegionIntersection", "RegionUnion", "Rotate", "Scale", "SectorAt", "Select", "TruncatedNormal", "Undefined",
+    "Value", "Vector", "VectorOf", "VectorSum",
 ]  # fmt: skip
 
 Vector: TypeAlias = tuple[float, float]
@@ -458,6 +459,22 @@ class Corridor(_Region):
     half_width: Node
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class AheadInLanes(_Region):
+    """What lies in the lanes of an object from its place to so many metres on (`scenicq.geometry.lane_stretches`).
+
+    Attributes:
+        heading, last: Its own and the number of its track's last lane, which tell its lanes from others; None for all.
+        network: The map.
+    """
+
+    point: Node
+    heading: Node
+    last: Node
+    distance: Node
+    network: Network
+
+
 # --- booleans
 
 
@@ -575,6 +592,6 @@ Leaf: TypeAlias = Range | Normal | TruncatedNormal | DiscreteRange | Index | Poi
 Node: TypeAlias = (
     Constant | Feature | Leaf | Select | Arithmetic | Coordinate | Norm | Bearing | Distance | DirectionAt |
     CourseCoordinate | Measure | LaneCourse | VectorOf | VectorSum | Scale | Rotate | DiscAt | SectorAt |
-    RectangleAt | Corridor |
+    RectangleAt | Corridor | AheadInLanes |
     RegionUnion | RegionIntersection | RegionDifference | Compare | Logic | Contains | Intersects | Encloses | Among
 )  # fmt: skip

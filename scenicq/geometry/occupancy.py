@@ -14,7 +14,7 @@ falls into convex pieces.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TypeAlias
@@ -31,7 +31,7 @@ from scenicq.geometry.regions import SLACK
 from scenicq.geometry.road_direction import RoadDirection
 from scenicq.geometry.shapes import Bounds, Shape
 
-__all__ = ["ALONG", "TOLERANCE", "ElementAtPoint", "Layer", "Occupancy", "OptionArea"]
+__all__ = ["ALONG", "TOLERANCE", "ElementAtPoint", "Layer", "Occupancy", "OptionArea", "leads"]
 
 ALONG = math.radians(60)
 """How far a lane may lead from the heading of who is in it for it to be one of its own, where several are there."""
@@ -52,6 +52,11 @@ _Owners: TypeAlias = tuple[int, tuple[int, ...]]
 """The number of the layer that counts at a point, and the owners of its areas there."""
 _Meant: TypeAlias = tuple[bool, ...]
 """Which of the options at a point may be meant."""
+
+
+def leads(ways: Iterable[float], heading: float) -> bool:
+    """Whether some of the directions of a lane is that of who goes there."""
+    return any(abs(math.remainder(way - heading, math.tau)) <= ALONG for way in ways)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -161,7 +166,7 @@ class Occupancy:
         meant: list[_Meant] = []
         for options, place, heading, before in zip(found, places, going, last, strict=True):
             ways, (level, owners) = self._known_ways[place]
-            own = tuple(any(abs(math.remainder(way - heading, math.tau)) <= ALONG for way in each) for each in ways)
+            own = tuple(leads(each, heading) for each in ways)
             if not math.isnan(before):
                 continuing = (before in self.continued[level][owner] for owner in owners)
                 own = tuple(along or further for along, further in zip(own, continuing, strict=True))

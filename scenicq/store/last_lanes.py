@@ -1,6 +1,6 @@
 """The last lane of a track: what tells where somebody drives whose heading fits another lane, as in a U-turn.
 
-The lanes of a label object are, of several that lie at its place, those that lead within `ALONG` of its heading, and
+The lanes of a label object are, of several that lie at its place, those that lead within 60 degrees of its heading, and
 those that continue the last lane of its track; where there is none, or no heading, all. The *last lane* is the one
 that was its only lane when it last had a single one; where that leads across its heading and continues nothing, it has
 none. A lane continues itself, and those that lead to it. Nothing is known across `LONGEST_GAP_US`.
@@ -16,7 +16,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from scenicq.geometry.occupancy import ALONG
+from scenicq.geometry.occupancy import leads
 from scenicq.store.motion import LONGEST_GAP_US, track_numbers
 
 __all__ = ["LanePairs", "last_lanes", "tracks_of_both"]
@@ -117,7 +117,4 @@ def _lead(
     """Whether the lanes of some pairs lead the way that members go."""
     member, lane = pairs.member[some], pairs.lane[some]
     asked = zip(ways(member, lane), headings[member].tolist(), strict=True)
-    return np.array(
-        [any(abs(math.remainder(way - heading, math.tau)) <= ALONG for way in each) for each, heading in asked],
-        dtype=np.bool_,
-    )
+    return np.array([leads(each, heading) for each, heading in asked], dtype=np.bool_)
