@@ -50,7 +50,8 @@ LANES = click.option(
     type=option_type("lanes"),
     default="along",
     help="Which of several lanes that contain an object are its own, as in `ego.lane`: along, those that lead within "
-    "60 degrees of its heading, and all where none does or it has no heading; any, all of them.",
+    "60 degrees of its heading or go on from the last lane of its track, and all where none does or it has no heading; "
+    "any, all of them.",
 )
 """The option for the lanes of an object; see `compile_scenario`."""
 

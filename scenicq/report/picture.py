@@ -14,6 +14,7 @@ from typing import Literal
 from scenicq.forest.scenario import Scenario
 from scenicq.geometry.shapes import XY, Bounds
 from scenicq.match.verdict import Match, NoMatch, Unknown, Verdict
+from scenicq.query.execution.own_lanes import OwnLanes, show_standing
 from scenicq.query.explain.frame_explanation import Explanation
 from scenicq.report.backdrop import Backdrop
 from scenicq.report.distances import draw_distances, measured_distances
@@ -240,9 +241,14 @@ def caption(shot: Shot) -> list[tuple[str, str]]:
             lines.append(("unknown", f"unknown ({reason}): {cause.what}"))
         case None:
             pass
-    for role in shot.roles:
+    roles = shot.roles
+    playing = {role.name: role.member.id for role in roles}
+    lanes = {} if shot.scenario is None else OwnLanes(shot.scenario).of_label(label, playing)
+    for role in roles:
         member = role.member
-        lines.append((f"name {role.colour}", f"{role.name} = {member.id} ({member.source_class or member.category})"))
+        told = f"{role.name} = {member.id} ({member.source_class or member.category})"
+        where = f", {show_standing(lanes[role.name])}" if role.name in lanes else ""
+        lines.append((f"name {role.colour}", told + where))
     return lines
 
 

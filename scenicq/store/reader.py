@@ -25,13 +25,24 @@ from scenicq.store.schema import ArrowTable
 if TYPE_CHECKING:
     from scenicq.store.recorded_tracks import RecordedTracks
 
-__all__ = ["EGO_COLUMNS", "LABEL_COLUMNS", "MOTION_COLUMNS", "OBJECT_COLUMNS", "RowFile", "assemble", "read_labels"]
+__all__ = [
+    "EGO_COLUMNS",
+    "LABEL_COLUMNS",
+    "LAST",
+    "MOTION_COLUMNS",
+    "OBJECT_COLUMNS",
+    "RowFile",
+    "assemble",
+    "read_labels",
+]
 
 _BATCH = 2048
 _FEW = 64
 """Texts that are decoded one by one."""
+LAST = "last_lane"
+"""The column of the last lane of a track."""
 OBJECT_COLUMNS = ["id", "class", "source_class", "x", "y", "heading", "width", "length", "height", "vx", "vy"]
-OBJECT_COLUMNS.extend(("track", "attributes"))
+OBJECT_COLUMNS.extend(("track", "attributes", LAST))
 MOTION_COLUMNS = ["motion_vx", "motion_vy", "acceleration", "yaw_rate", "motion_derived"]
 """What is computed of motion; a query that does not ask for it need not read it."""
 EGO_COLUMNS = [f"ego_{name}" for name in OBJECT_COLUMNS[1:]]
@@ -199,9 +210,9 @@ def _spaces(table: ArrowTable, prefix: str) -> Iterable[OutOfPlane | None]:
 
 def _objects(columns: list[list[Any]], table: ArrowTable, prefix: str) -> list[LabelObject]:
     motions, spaces = _motions(table, prefix), _spaces(table, prefix)
-    *before, vx, vy, track, attributes = columns
+    *before, vx, vy, track, attributes, last_lanes = columns
     velocities = [None if x is None else (x, y) for x, y in zip(vx, vy, strict=True)]
-    return [*map(LabelObject, *before, velocities, track, attributes, motions, spaces)]
+    return [*map(LabelObject, *before, velocities, track, attributes, motions, spaces, last_lanes)]
 
 
 def _values(table: ArrowTable, name: str) -> list[Any]:

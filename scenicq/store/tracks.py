@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scenicq.geometry.driven_courses import CoursePlace
 from scenicq.geometry.network import Network
 from scenicq.store.dataset import Dataset
-from scenicq.store.reader import MOTION_COLUMNS, RowFile
+from scenicq.store.reader import LAST, MOTION_COLUMNS, RowFile
 from scenicq.store.recorded_tracks import RecordedTracks
 from scenicq.store.schema import ArrowTable
 
@@ -22,7 +22,7 @@ __all__ = ["RecordingTracks", "TrackKey", "TrackReader"]
 TrackKey: TypeAlias = tuple[str, str]
 """("ego", ""), ("track", its name), or ("object", frame and id) for a label object without a track."""
 
-_NUMBERS = ("x", "y", "heading", "width", "length", "height", *MOTION_COLUMNS[:-1])
+_NUMBERS = ("x", "y", "heading", "width", "length", "height", *MOTION_COLUMNS[:-1], LAST)
 Numbers = NDArray[np.float64]
 
 
