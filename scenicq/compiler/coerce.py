@@ -16,7 +16,7 @@ from scenicq.errors import Span
 from scenicq.forest.angle_wrap import any_turn
 from scenicq.forest.build import compare, constant, vector
 from scenicq.forest.kinds import kind_of
-from scenicq.forest.nodes import COURSE, GOING, CompareOp, Constant, Feature, Kind, Node, Select, Undefined
+from scenicq.forest.nodes import COURSE, GOING, LAST_LANE, CompareOp, Constant, Feature, Kind, Node, Select, Undefined
 from scenicq.geometry.elements import NetworkElement
 from scenicq.geometry.regions import Everywhere, Region
 from scenicq.syntax.hints import condition_hint
@@ -50,6 +50,7 @@ OBSERVABLE: dict[str, Kind] = {
     "acceleration": "scalar",
     COURSE: "other",
     GOING: "other",
+    LAST_LANE: "other",
 }
 """Properties that a label can observe, by kind: references to them are conditioned on the label."""
 
@@ -63,9 +64,13 @@ _OVER_TIME: ContextVar[bool] = ContextVar("_OVER_TIME", default=False)
 
 
 @contextmanager
-def read_over_time() -> Generator[None]:
-    """While a condition over time is evaluated: what it reads of objects is read at each sample."""
-    token = _OVER_TIME.set(True)
+def read_over_time(*, current: bool = True) -> Generator[None]:
+    """While a condition over time is evaluated: what it reads of objects is read at each sample.
+
+    Args:
+        current: Whether it is one: what makes objects within a run is not.
+    """
+    token = _OVER_TIME.set(current)
     try:
         yield
     finally:

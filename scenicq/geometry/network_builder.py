@@ -40,7 +40,7 @@ from scenicq.geometry.elements import (
 )
 from scenicq.geometry.features import MapFeature, names
 from scenicq.geometry.maneuvers import by_heading, maneuvers_of
-from scenicq.geometry.own_directions import along_centerline, direction_of_intersection, direction_of_lanes
+from scenicq.geometry.own_directions import along_unread_centerline, direction_of_intersection, direction_of_lanes
 from scenicq.geometry.regions import DeferredPolylines, PolylineSet
 
 __all__ = ["Elements", "link"]
@@ -80,8 +80,8 @@ def link(features: Sequence[MapFeature]) -> Elements:
         features: With unique ids.
     """
     elements = Elements()
-    for feature in features:
-        _make(feature, elements)
+    for number, feature in enumerate(features):
+        _make(feature, number, elements)
     by_kind: dict[str, list[MapFeature]] = {}
     for feature in features:
         by_kind.setdefault(feature.kind, []).append(feature)
@@ -104,14 +104,14 @@ def link(features: Sequence[MapFeature]) -> Elements:
     return elements
 
 
-def _make(feature: MapFeature, elements: Elements) -> None:
+def _make(feature: MapFeature, number: int, elements: Elements) -> None:
     if feature.kind == "curb":
         return
     area = cast("Polygon | MultiPolygon", feature.shape)
     plain = (feature.id, area, feature.properties)
     match feature.kind:
         case "lane":
-            elements.lanes[feature.id] = _along(Lane(*plain), feature)
+            elements.lanes[feature.id] = _along(Lane(*plain, number=number), feature)
         case "lane_group":
             elements.groups[feature.id] = _along(LaneGroup(*plain), feature)
         case "road":
@@ -132,7 +132,7 @@ def _along(element: _Long, feature: MapFeature) -> _Long:
     """An element with the lines that the map gives, and the direction that its centreline has."""
     element.left_edge, element.right_edge = given_line(feature, "left_edge"), given_line(feature, "right_edge")
     if has_centerline(feature):
-        element.orientation = along_centerline(feature.id, feature.shape, partial(centerlines, feature))
+        element.orientation = along_unread_centerline(feature.id, feature.shape, partial(centerlines, feature))
         element.centerline = DeferredPolylines(
             f"centerline of {feature.id}", partial(_centerline, feature), element.orientation
         )

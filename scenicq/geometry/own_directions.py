@@ -14,7 +14,7 @@ from scenicq.geometry.regions import PolylineSet
 from scenicq.geometry.road_direction import DeferredDirection, DirectedLane, RoadDirection
 from scenicq.geometry.shapes import Coordinates, Shape
 
-__all__ = ["along_centerline", "direction_of_intersection", "direction_of_lanes"]
+__all__ = ["along_centerline", "along_unread_centerline", "direction_of_intersection", "direction_of_lanes"]
 
 _EVERYWHERE = 1e6
 """Metres within which an element's direction is looked for: farther than any map."""
@@ -22,13 +22,25 @@ _BESIDE = 0.05
 """Metres beside a lane that count as in it where no lane is."""
 
 
-def along_centerline(name: str, area: Shape, lines: Callable[[], tuple[Coordinates, ...]]) -> RoadDirection:
-    """The direction of the nearest segment of an element's centreline, which is read when somebody asks for it.
+def along_centerline(name: str, area: Shape, lines: tuple[Coordinates, ...]) -> RoadDirection | None:
+    """The direction of the nearest segment of an element's centreline; None where the map gives none.
 
     Args:
         name: The element's identifier.
         area: Its polygon.
-        lines: Gives the polylines of its centreline, (n, 2) each.
+        lines: The polylines of its centreline, (n, 2) each.
+    """
+    own = (DirectedLane(area, lines),)
+    return RoadDirection(own, f"orientation of {name}", farthest=_EVERYWHERE) if lines else None
+
+
+def along_unread_centerline(name: str, area: Shape, lines: Callable[[], tuple[Coordinates, ...]]) -> RoadDirection:
+    """The same of a centreline that the map gives, and that is read when somebody asks for its direction.
+
+    Args:
+        name: The element's identifier.
+        area: Its polygon.
+        lines: Gives the polylines.
     """
 
     def make() -> RoadDirection:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 from scenicq.forest.groups import PARAMS, Comparison, Group
 from scenicq.forest.nodes import (
+    AheadInLanes,
     Among,
     Arithmetic,
     Compare,
@@ -92,6 +93,8 @@ def shape_of(group: Group, ego: int, tolerance: Tolerance) -> GroupShape:
                 own = node.measure, node.seconds, node.end
             case LaneCourse():
                 own = id(node.network), node.gap_s
+            case AheadInLanes():
+                own = id(node.network)
             case _ if is_leaf(node):
                 number = leaves.setdefault(node.identity, len(leaves))  # type: ignore[union-attr]
                 own = (number, node.weights if isinstance(node, Index) else ())
@@ -248,6 +251,9 @@ class _Forms(ValueNumbers):
     def over_time(self, dynamics: Dynamics, swap: Mapping[int, int]) -> Hashable:
         """All that is said about time, with some objects put for others."""
         atoms = [self.expression(condition, swap) for condition in dynamics.conditions]
+        if dynamics.scenarios:
+            # scenarios that run one after the other tell their objects apart
+            return tuple(atoms), tuple(sorted(swap.items()))
         said: Counter[Hashable] = Counter()
         for requirement in dynamics.requirements:
             said["require", self._formula(requirement.formula, atoms)] += 1

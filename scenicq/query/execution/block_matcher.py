@@ -35,8 +35,10 @@ if TYPE_CHECKING:  # they take long to load, and not every query needs the last 
 
     from scenicq.match.matcher import Matcher
     from scenicq.match.problem.candidates import Candidates
+    from scenicq.query.execution.own_lanes import OwnLanes
     from scenicq.query.execution.recorder import Recorder
     from scenicq.query.execution.recording_matcher import DecidedRecordings, RecordingMatcher
+    from scenicq.query.execution.variant_matcher import VariantMatcher
 
 _FIRST_BATCH, _BATCH = 16, 2048
 """Labels whose places are looked up together: few until it is known what matters."""
@@ -80,13 +82,16 @@ class CompiledMap:
         if prefilter:
             plan = make_plan(scenario, network, options, deciding=not proofs, counting=reasons)
         asked = properties_of_others(scenario)
-        observed = frozenset[str](asked or ()).union(*relevant_properties(scenario, options))
-        motion = not MOTION.isdisjoint(observed)
-        return cls(scenario, network, plan, motion, observed, asked is not None, not network.is_read)
+        every = (scenario, *scenario.variants)
+        relevant = [names for each in every for names in relevant_properties(each, options)]
+        observed = frozenset[str](asked or ()).union(*relevant)
+        motion, whole = not MOTION.isdisjoint(observed), asked is not None or bool(scenario.variants)
+        return cls(scenario, network, plan, motion, observed, whole, not network.is_read)
 
     def over(self, scenario: Scenario, network: Network) -> CompiledMap:
         """The same over another map of the same traits, given the scenario over that map."""
-        named = replace(scenario, map=network.name)
+        variants = tuple(replace(each, map=network.name) for each in scenario.variants)
+        named = replace(scenario, map=network.name, variants=variants)
         return replace(self, scenario=named, network=network, plan=replace(self.plan, map=network.name))
 
 
@@ -139,8 +144,9 @@ class Decider:
     time: IntervalOptions = field(default_factory=IntervalOptions)
     until: float | None = None
     _recorders: Recent[str, Recorder] = field(default_factory=lambda: Recent(MAPS_KEPT))
+    _own_lanes: Recent[str, OwnLanes | None] = field(default_factory=lambda: Recent(MAPS_KEPT))
     _matchers: Recent[str, Matcher] = field(default_factory=lambda: Recent(MAPS_KEPT))
-    _over_time: Recent[str, RecordingMatcher] = field(default_factory=lambda: Recent(MAPS_KEPT))
+    _over_time: Recent[str, RecordingMatcher | VariantMatcher] = field(default_factory=lambda: Recent(MAPS_KEPT))
     _open: ExitStack = field(default_factory=ExitStack)
     _connection: duckdb.DuckDBPyConnection | None = None
     _solver: LazySolver | None = None
@@ -173,6 +179,9 @@ class Decider:
             decided = self._decide(block)
         if self.until is not None:
             decided = replace(decided, found=self._in_time(iter(decided.found)))
+        own_lanes = self._lanes_of(block.map) if decided.recordings is not None else None
+        if decided.recordings is not None and own_lanes is not None:
+            decided.recordings.results = [*own_lanes.at_the_start(self.dataset, decided.recordings.results)]
         recorder = self._recorder(block.map)
         if recorder is None:
             return decided
@@ -282,6 +291,19 @@ class Decider:
 
         return self._recorders.get(map_name, make)
 
+    def _lanes_of(self, map_name: str) -> OwnLanes | None:
+        """What names the lanes of roles; None where nobody reads them, or the program asks for none."""
+        if not self.proofs:
+            return None
+        # takes long to load
+        from scenicq.query.execution.own_lanes import OwnLanes  # noqa: PLC0415
+
+        def make() -> OwnLanes | None:
+            asked = OwnLanes(self.plan_map(map_name).scenario).asked
+            return OwnLanes(self.compile_map(map_name).scenario) if asked else None
+
+        return self._own_lanes.get(map_name, make)
+
     def _players(
         self, plan: Plan, block: Block, frames: NDArray[np.int64]
     ) -> tuple[NDArray[np.int16], Mapping[str, NDArray[Any]]]:
@@ -297,16 +319,22 @@ class Decider:
         missed = np.where(left, -1, 0).astype(np.int16)
         return missed, {name: each[left[place]] for name, each in found.items()}
 
-    def _recording_matcher(self, map_name: str) -> RecordingMatcher:
+    def _recording_matcher(self, map_name: str) -> RecordingMatcher | VariantMatcher:
         # take long to load
+        from scenicq.match.matcher import Matcher  # noqa: PLC0415
         from scenicq.query.execution.recording_matcher import RecordingMatcher  # noqa: PLC0415
+        from scenicq.query.execution.variant_matcher import VariantMatcher  # noqa: PLC0415
         from scenicq.temporal.intervals import IntervalMatcher  # noqa: PLC0415
 
-        def make() -> RecordingMatcher:
-            scenario = self.compile_map(map_name).scenario
+        def made(scenario: Scenario, matcher: Matcher) -> RecordingMatcher:
             intervals = IntervalMatcher(scenario, self.options, self.time, self._solver, self.reasons)
-            matcher = self._matcher(map_name)
             return RecordingMatcher(self.dataset, matcher, intervals, self.every, self.proofs, self.reasons)
+
+        def make() -> RecordingMatcher | VariantMatcher:
+            scenario = self.compile_map(map_name).scenario
+            if not scenario.variants:
+                return made(scenario, self._matcher(map_name))
+            return VariantMatcher([made(one, Matcher(one, self.options, self._solver)) for one in scenario.variants])
 
         return self._over_time.get(map_name, make)
 
@@ -324,14 +352,14 @@ class Decider:
         """The results of labels, whose places are looked up so many at a time."""
         size = _FIRST_BATCH
         for map_name, mine in groupby(left, key=lambda each: each.label.map):
-            matcher = self._matcher(map_name)
+            matcher, own_lanes = self._matcher(map_name), self._lanes_of(map_name)
             while batch := list(islice(mine, size)):
                 if self.all_matches:
                     for label, among in batch:
-                        yield [_result(label, verdict) for verdict in _every_match(matcher, label, among)]
+                        yield [_result(label, verdict, own_lanes) for verdict in _every_match(matcher, label, among)]
                 else:
                     for (label, _), verdict in zip(batch, matcher.match_all(batch, details=self.every), strict=True):
-                        yield [_result(label, verdict)]
+                        yield [_result(label, verdict, own_lanes)]
                 size = _BATCH
 
 
@@ -353,8 +381,11 @@ def _with_records(recorder: Recorder, found: Iterator[list[Result]]) -> Iterator
     raise DeadlineError
 
 
-def _result(label: Label, verdict: Verdict) -> Result:
-    return Result(label.frame, label.recording, label.timestamp_us, verdict, label.sensors)
+def _result(label: Label, verdict: Verdict, own_lanes: OwnLanes | None) -> Result:
+    lanes = None
+    if own_lanes is not None and isinstance(verdict, Match):
+        lanes = own_lanes.of_label(label, verdict.correspondence)
+    return Result(label.frame, label.recording, label.timestamp_us, verdict, label.sensors, lanes=lanes)
 
 
 def _every_match(matcher: Matcher, label: Label, among: Candidates | None) -> list[Verdict]:

@@ -64,7 +64,7 @@ class DecidedRecordings:
 
     @classmethod
     def nothing(cls, rows: Block) -> DecidedRecordings:
-        """Of a block of whole recordings in which nothing starts."""
+        """What becomes of a block of whole recordings in which nothing starts."""
         return cls(counts=Counter(recordings=len(rows.runs)))
 
 
