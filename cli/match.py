@@ -33,7 +33,7 @@ from .datasets import open_checked
 from .deliver import Wanted, deliver, exit_code
 from .engine import parse_engine
 from .formats import FORMATS, SPREADSHEET_HELP
-from .funnel import show_funnel
+from .funnel import MatchSample, show_funnel
 from .main import INTERRUPTS, UNDECIDED
 from .manual import OPEN, Manual
 from .option_type import OptionType
@@ -192,8 +192,8 @@ def match(ctx: click.Context, scenario: str | None, dataset: str | None, *, prog
     reads = report or export or rank or sample or shard or engine or resume or options.all_matches or by_recorded
     if chosen == "ids" and not reads:
         options = replace(options, proofs=False)
-    told = summary or (sys.stderr.isatty() and not quiet)
-    if not (told or explain or report or near or shard or engine or resume):
+    summarized = summary or (sys.stderr.isatty() and not quiet)
+    if not (summarized or explain or report or near or shard or engine or resume):
         # of frames, advice reads it, too
         options = replace(options, interval_reasons=False, reasons=advised or not quiet)
     if deadline is not None:
@@ -215,8 +215,7 @@ def match(ctx: click.Context, scenario: str | None, dataset: str | None, *, prog
             show(error.diagnostics)
             ctx.exit(0 if exit_zero else UNDECIDED)
         query.funnel = replace(funnel, warnings=query.funnel.warnings)
-        _conclude(ctx, query, told, said, time.perf_counter() - started, summary=summary, quiet=quiet,
-                  exit_zero=exit_zero)  # fmt: skip
+        _conclude(ctx, query, told, said, time.perf_counter() - started, summarized=summarized, exit_zero=exit_zero)
         return
     pieces = None
     again = "the same command goes on from here" if resume else "`--resume` keeps what is done until it stops"
@@ -233,6 +232,9 @@ def match(ctx: click.Context, scenario: str | None, dataset: str | None, *, prog
         return _selected(query, found, sample, rank=rank, diverse=diverse) if rank or sample is not None else found
 
     results = drawn(results) if selection is None else selection.applied(results, query.funnel, drawn)
+    matching = MatchSample()
+    if summarized and not query.is_over_time():
+        results = matching.gathered(results)
     came_close: list[str] = []
     with contextlib.nullcontext() if pieces is None else sole_writer(pieces):
         try:
@@ -258,7 +260,7 @@ def match(ctx: click.Context, scenario: str | None, dataset: str | None, *, prog
         advise(query, asked=advised, near=near is not None)
     told = [*told, *cut]
     elapsed_s = time.perf_counter() - started
-    _conclude(ctx, query, told, said, elapsed_s, summary=summary, quiet=quiet, exit_zero=exit_zero)
+    _conclude(ctx, query, told, said, elapsed_s, matching, summarized=summarized, exit_zero=exit_zero)
 
 
 def _noted(found: Iterable[Result], recordings: list[str]) -> Iterator[Result]:
@@ -317,13 +319,13 @@ def _conclude(
     told: Collection[Diagnostic],
     said: ResultSummary | None,
     elapsed_s: float,
+    matching: MatchSample | None = None,
     *,
-    summary: bool,
-    quiet: bool,
+    summarized: bool,
     exit_zero: bool,
 ) -> None:
     """Print the summary and choose the exit code."""
-    if summary or (sys.stderr.isatty() and not quiet):
-        show_funnel(query, elapsed_s, told)
+    if summarized:
+        show_funnel(query, elapsed_s, told, matching or MatchSample())
     if not exit_zero:
         ctx.exit(exit_code(query.funnel, said))

@@ -7,7 +7,6 @@ import click
 from scenicq.errors import Diagnostic
 from scenicq.query.execution.result_selection import ResultSelection
 
-from .options import option_type
 from .report import count, show
 
 __all__ = ["SORT", "WHERE", "tell_unclear"]
@@ -15,7 +14,6 @@ __all__ = ["SORT", "WHERE", "tell_unclear"]
 WHERE = click.option(
     "--where",
     metavar="CONDITION",
-    type=option_type("where"),
     help="Show only matches that meet a condition on what the program records (`record (distance to lead) as gap`): "
     "'gap < 5', over time 'gap.minimum < 5'; also `and`, `or`, `not`. Where a value is null it is not known: such "
     "matches are left out, and counted.",
@@ -24,7 +22,6 @@ WHERE = click.option(
 SORT = click.option(
     "--sort",
     metavar="NAME[:desc]",
-    type=option_type("sort"),
     help="Order matches by a value that the program records, the least first, those without one last; with --limit no "
     "more than so many are kept in memory.",
 )
