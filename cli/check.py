@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -21,9 +21,10 @@ from scenicq.lint.program import LINTED_MAPS, lint
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.constraints import build_groups, describe_constraint
 from scenicq.match.problem.preprocess import ready
+from scenicq.option_values import read_option
 from scenicq.query.execution.compiled_map import about_dataset, is_about_map, program_network, read_network
 from scenicq.query.execution.never_compared import coverage
-from scenicq.query.execution.option_texts import VERSIONS
+from scenicq.query.execution.option_texts import KINDS, VERSIONS
 from scenicq.query.execution.program_files import SiblingFiles
 from scenicq.store.dataset import Dataset
 
@@ -31,7 +32,7 @@ from .datasets import open_checked
 from .main import ERROR
 from .manual import Manual
 from .path_type import LOCAL_PATH
-from .programs import MAP_DEFAULTS, PROGRAM_TEXT, SCENARIO, given_program
+from .programs import MAP_DEFAULTS, PARAMS, PROGRAM_TEXT, RUN_SCENARIO, SCENARIO, given_program
 from .report import as_json, count, show
 from .streams import say
 from .user_folders import map_cache
@@ -108,7 +109,7 @@ def _groups(scenario: Scenario) -> list[str]:
 
 @dataclass(frozen=True, slots=True)
 class _Asked:
-    """What a check looks at beside the program.
+    """What a check takes into account besides the program.
 
     Attributes:
         options: Classes and ego.
@@ -117,6 +118,8 @@ class _Asked:
         strict: Whether warnings of what cannot be meant are errors.
         model: The world model of a program that imports none.
         map_defaults: Whether the world model places and turns what the program does not.
+        run_scenario: Which scenario of the program runs.
+        params: Values of global parameters.
     """
 
     options: MatchOptions
@@ -125,12 +128,14 @@ class _Asked:
     strict: bool
     model: str | None
     map_defaults: bool
+    run_scenario: str | None
+    params: Mapping[str, float | str]
 
 
 def _found(
     source: Source, networks: Iterator[Network], version: int | None, initial: bool, details: Details, asked: _Asked
 ) -> tuple[list[str], list[Diagnostic]]:
-    """A line for each map that the scenario fits, and every diagnostic once.
+    """Check the program on each map: a line for each that the scenario fits, and every diagnostic once.
 
     A map that lacks what the scenario needs is no error where another map has it.
     """
@@ -151,6 +156,8 @@ def _found(
                 loader=loader,
                 model=asked.model,
                 map_defaults=asked.map_defaults,
+                scenario=asked.run_scenario,
+                params=asked.params,
             )
         except ScenarioError as error:
             if asked.dataset is not None:
@@ -194,6 +201,8 @@ def _found(
 @click.argument("scenario", metavar="SCENARIO", type=click.Path(), required=False)
 @click.argument("dataset", metavar="[DATASET]", type=click.Path(), required=False)
 @PROGRAM_TEXT
+@RUN_SCENARIO
+@PARAMS
 @click.option("--map", "map_file", metavar="FILE", type=LOCAL_PATH, help="A GeoJSON or OpenDRIVE map.")
 @click.option("--scenic", type=click.Choice(["1", "2", "3"]), help="Version of Scenic.  [default: inferred]")
 @MAP_DEFAULTS
@@ -211,8 +220,9 @@ def _found(
     help="json gives the diagnostics as a list.",
 )
 @click.pass_context
-def check(ctx: click.Context, scenario: str | None, dataset: str | None, *, program: str | None, map_file: Path | None,
-          scenic: str | None, map_defaults: bool, initial: bool, forest: bool, groups: bool,
+def check(ctx: click.Context, scenario: str | None, dataset: str | None, *, program: str | None,
+          run_scenario: str | None, params: tuple[tuple[str, str], ...], map_file: Path | None, scenic: str | None,
+          map_defaults: bool, initial: bool, forest: bool, groups: bool,
           classes: Literal["fine", "coarse"], strict: bool, format_: str) -> None:  # fmt: skip
     """Say whether a scenario is sound, and how it is read.
 
@@ -236,6 +246,8 @@ def check(ctx: click.Context, scenario: str | None, dataset: str | None, *, prog
             strict,
             model,
             map_defaults,
+            run_scenario,
+            dict(read_option("params", KINDS["params"], params)),
         )
         lines, diagnostics = _found(source, networks, version, initial, details, asked)
         diagnostics += warnings

@@ -42,7 +42,7 @@ from .output import ProgressBar, choose_format
 from .path_type import ANY_PATH, chosen_file
 from .pieces import LateShardError, Shard, parse_shard, run_shard
 from .plan import show_plan
-from .programs import LANES, MAP_DEFAULTS, PROGRAM_TEXT, SCENARIO, given_program
+from .programs import LANES, MAP_DEFAULTS, PARAMS, PROGRAM_TEXT, RUN_SCENARIO, SCENARIO, given_program
 from .remarks import remarks, show_remarks
 from .report import show
 from .selections import SORT, WHERE, tell_unclear
@@ -52,7 +52,7 @@ __all__ = ["match"]
 
 
 def _near(query: Query, count: int | None) -> Iterator[Result]:
-    """The frames or recordings that come closest, looked for once the matches are there."""
+    """Look for the frames or recordings that come closest, after the matches."""
     if count is None or query.funnel.cut:
         return
     if query.is_over_time():
@@ -84,6 +84,8 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @click.argument("scenario", metavar="SCENARIO", type=click.Path(), required=False)
 @click.argument("dataset", metavar="DATASET", type=click.Path(), required=False)
 @PROGRAM_TEXT
+@RUN_SCENARIO
+@PARAMS
 @click.option("--tolerance", metavar="LIST",
               help="How far labels may be off, in metres, deg or rad: position=, heading=, speed= and so on; "
               "for some objects ego.heading=15deg, Pedestrian.position=0.5; a bare size for all; or `exact`, 1e-3.  "
@@ -264,7 +266,7 @@ def match(ctx: click.Context, scenario: str | None, dataset: str | None, *, prog
 
 
 def _noted(found: Iterable[Result], recordings: list[str]) -> Iterator[Result]:
-    """The same results; the list takes the recording of each."""
+    """Pass results on, and note the recording of each in the list."""
     for result in found:
         recordings.append(result.recording)
         yield result
@@ -279,7 +281,7 @@ def _tell_far(query: Query) -> None:
 
 
 def _tell_cut(query: Query, *, resume: bool) -> None:
-    """Say that the time was over, also where no summary is printed."""
+    """Say that the deadline ended the query, even where no summary is printed."""
     done, total = query.funnel.frames, query.dataset.manifest.total.frames
     message = f"the deadline passed: {done:,} of {total:,} frames are decided, and the others are not in the results"
     again = "the same command goes on from here" if resume else "`--resume` with `-o FILE` keeps what is done"
@@ -289,7 +291,7 @@ def _tell_cut(query: Query, *, resume: bool) -> None:
 def _selected(
     query: Query, results: Generator[Result], sample: int | None, *, rank: bool, diverse: bool
 ) -> Generator[Result]:
-    """Some of the matches, or all in another order, once all are there."""
+    """Sample or rank the matches, once all are there."""
     from scenicq.evaluate.ranking import rank_results, sample_diverse, sample_plain  # noqa: PLC0415 - takes long to load
 
     with contextlib.closing(results):

@@ -21,6 +21,7 @@ DEFAULTS = MatchOptions()
 SHARED = frozenset({
     "tolerance", "classes", "ego", "radius", "enforce", "exact", "solver", "method", "timeout", "budget", "scenic",
     "initial", "map_defaults", "lanes", "behaviors", "reaction", "ignore_params", "strict",
+    "run_scenario", "params",
 })  # fmt: skip
 """Options of `match` that say what a match is; the others say which frames and what to show of them."""
 OVER_TIME = frozenset({"min_duration", "gap"})

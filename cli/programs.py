@@ -16,7 +16,16 @@ from scenicq.store.remote_path import local_path
 from .options import option_type
 from .path_type import check_here
 
-__all__ = ["LANES", "MAP_DEFAULTS", "PROGRAM_TEXT", "SCENARIO", "given_program", "read_scenario"]
+__all__ = [
+    "LANES",
+    "MAP_DEFAULTS",
+    "PARAMS",
+    "PROGRAM_TEXT",
+    "RUN_SCENARIO",
+    "SCENARIO",
+    "given_program",
+    "read_scenario",
+]
 
 SCENARIO = "A Scenic program, as a file; `-` is standard input. Not with -e."
 """What the help says of the argument."""
@@ -47,8 +56,27 @@ LANES = click.option(
 """The option for the lanes of an object; see `compile_scenario`."""
 
 
+RUN_SCENARIO = click.option(
+    "--scenario",
+    "run_scenario",
+    metavar="NAME",
+    help="Which scenario of a program with several runs.  [default: Main, or the only one]",
+)
+"""The option for the scenario that runs; see `compile_scenario`."""
+PARAMS = click.option(
+    "-p",
+    "--param",
+    "params",
+    metavar="NAME VALUE",
+    nargs=2,
+    multiple=True,
+    help="Give a global parameter a value, whatever the program says: a number or a text. Can be given several times.",
+)
+"""The option for parameters; see `compile_scenario`."""
+
+
 def read_scenario(path: str | Path) -> Source:
-    """The program of a file, or of standard input for `-`.
+    """Read the program from a file, or from standard input for `-`.
 
     Raises:
         DataError: file-missing; file-invalid where it is not UTF-8 text; option-invalid where it lies elsewhere.
@@ -66,10 +94,10 @@ def read_scenario(path: str | Path) -> Source:
 def given_program(
     ctx: click.Context, text: str | None, words: Sequence[str | None], needed: int = 0
 ) -> tuple[Source, list[str | None], str | None]:
-    """The program and the other arguments of a command whose program may be an option.
+    """Tell the program from the other arguments, where the program may be an option.
 
     Args:
-        ctx: Of the command, for its usage.
+        ctx: The command's context, for its usage.
         text: The program itself, where it is given.
         words: The arguments in the order of the command's: the program, unless it is an option, and the others.
         needed: How many of the others must be there.

@@ -10,8 +10,8 @@ from scenicq.compiler.element_lookups import LaneRule
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import plain_json
 from scenicq.exporters.sample import PATIENCE_S, sample_labels, sample_record, write_sample
-from scenicq.option_values import SEED, Count
-from scenicq.query.execution.option_texts import read_built_ins
+from scenicq.option_values import SEED, Count, read_option
+from scenicq.query.execution.option_texts import KINDS, read_built_ins
 from scenicq.query.execution.program_files import SiblingFiles
 from scenicq.store.remote_path import AnyPath
 
@@ -20,7 +20,7 @@ from .manual import Manual
 from .option_type import OptionType
 from .options import option_type
 from .path_type import ANY_PATH, LOCAL_PATH
-from .programs import LANES, MAP_DEFAULTS, PROGRAM_TEXT, SCENARIO, given_program
+from .programs import LANES, MAP_DEFAULTS, PARAMS, PROGRAM_TEXT, RUN_SCENARIO, SCENARIO, given_program
 from .streams import say
 
 __all__ = ["sample"]
@@ -39,6 +39,8 @@ __all__ = ["sample"]
 @click.argument("scenario", metavar="SCENARIO", type=click.Path(), required=False)
 @click.argument("dataset", metavar="[DATASET]", type=click.Path(), required=False)
 @PROGRAM_TEXT
+@RUN_SCENARIO
+@PARAMS
 @click.option("--map", "map_file", metavar="FILE", type=LOCAL_PATH, help="A GeoJSON or OpenDRIVE map.")
 @click.option("-n", "--number", metavar="N", type=OptionType(Count()), default=1, help="Scenes to draw.")
 @click.option("--seed", metavar="N", type=OptionType(SEED), default=0, help="The same seed gives the same scenes.")
@@ -63,7 +65,7 @@ __all__ = ["sample"]
               help="Write an interchange folder with labels and map, to be ingested, here or elsewhere.")  # fmt: skip
 @click.pass_context
 def sample(ctx: click.Context, scenario: str | None, dataset: str | None, *, program: str | None,
-           map_file: Path | None, number: int, seed: int,
+           run_scenario: str | None, params: tuple[tuple[str, str], ...], map_file: Path | None, number: int, seed: int,
            waive: str, timeout: float, scenic: str | None, map_defaults: bool, lanes: LaneRule, initial: bool,
            output: AnyPath | None) -> None:  # fmt: skip
     """Draw scenes from a scenario, as labels.
@@ -84,6 +86,8 @@ def sample(ctx: click.Context, scenario: str | None, dataset: str | None, *, pro
         model=model,
         map_defaults=map_defaults,
         lanes=lanes,
+        scenario=run_scenario,
+        params=dict(read_option("params", KINDS["params"], params)),
     )
     labels = sample_labels(compiled, number, seed, read_built_ins(waive), timeout_s=timeout)
     if output is not None:

@@ -102,6 +102,11 @@ class Limits:
     region_parts: int = _refused(5_000, "parts", "of a region that is combined from others")
     random_way_steps: int = _refused(100, "steps", "along a field over a random distance")
     known_way_steps: int = _refused(2_000, "steps", "along a field over a known distance")
+    projection_segments: int = _refused(200, "segments", "of a line onto which a point is projected that is not known")
+    scenario_starts: int = _refused(8, "times", "that one call of a scenario that makes objects begins in a run")
+    scenario_variants: int = _refused(
+        16, "combinations", "of scenarios that make objects and begin in some runs of a program alone"
+    )
     process_steps: int = _refused(4_000, "steps", "of a monitor or behavior, of all that it can be in")
     rounded_nodes: int = _otherwise(
         16, "nodes", "of a number to be rounded that are looked at for a half that may be hit", "the general formula"

@@ -28,6 +28,7 @@ __all__ = [
     "Flag",
     "OneOf",
     "OptionKind",
+    "Parameters",
     "Text",
     "read_option",
     "read_options_of",
@@ -68,6 +69,47 @@ class OptionKind(Protocol):
             ValueError: It is none of the kind.
         """
         ...
+
+
+@dataclass(frozen=True, slots=True)
+class Parameters:
+    """Global parameters of a program by name, each a number or a text; a text that is a number stands for it."""
+
+    @property
+    def expected(self) -> str:
+        """What is expected, for people."""
+        return "names with a number or a text each"
+
+    def read(self, value: Any) -> tuple[tuple[str, float | str], ...]:
+        """The parameters, in the order of their names."""
+        pairs: Iterable[Any] = cast("Mapping[Any, Any]", value).items() if isinstance(value, Mapping) else value
+        if not isinstance(value, Mapping | list | tuple):
+            raise ValueError
+        found: dict[str, float | str] = {}
+        for pair in pairs:
+            if not isinstance(pair, list | tuple) or len(cast("list[Any]", pair)) != 2:
+                raise ValueError
+            name, given = cast("tuple[Any, Any]", pair)
+            if not isinstance(name, str) or not name or not isinstance(given, str | int | float):
+                raise ValueError
+            found[name] = _number_or_text(given)
+        return tuple(sorted(found.items()))
+
+
+def _number_or_text(value: str | float) -> float | str:
+    """A value as Scenic's `--param` takes it: a whole number, a number, else a text."""
+    if not isinstance(value, str):
+        if not math.isfinite(value):
+            raise ValueError
+        return value
+    for kind in (int, float):
+        try:
+            number = kind(value)
+        except (ValueError, OverflowError):
+            continue
+        if math.isfinite(number) and abs(number) < 1e300:
+            return number
+    return value
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, cast
 from scenicq.compiler import operators
 from scenicq.compiler.arithmetic import check_weight, hashed, is_flat, is_random
 from scenicq.compiler.coerce import property_node, to_heading, to_region, to_scalar, to_vector
+from scenicq.compiler.coroutines import NotBegun, ScenarioCall
 from scenicq.compiler.elements import MISSING, is_of_elements, names_of, of_element, of_network
 from scenicq.compiler.following import follow
 from scenicq.compiler.lookups import look_up_of
@@ -15,7 +16,7 @@ from scenicq.compiler.random_values import each_existing, regions_apart
 from scenicq.compiler.region_attributes import REGION_METHODS, holds_regions, of_region
 from scenicq.compiler.suggestions import unknown_attribute
 from scenicq.compiler.values import Builtin, Choice, Instance, ModelValue, Module, ScenicClass, describe, fail, is_node
-from scenicq.errors import Span
+from scenicq.errors import Diagnostic, Span
 from scenicq.forest import build
 from scenicq.forest.angle_wrap import one_turn
 from scenicq.forest.kinds import kind_of
@@ -100,6 +101,8 @@ def _names(value: ModelValue) -> set[str]:
             return set(value.properties) | set(_PART_NAMES)
         case Module():
             return set(value.names)
+        case ScenarioCall():
+            return set(value.names or ())
         case Network() | NetworkElement() | Maneuver() | Signal():
             return names_of(value)
         case _:
@@ -112,6 +115,10 @@ def _lookup(run: Interpreter, value: ModelValue, name: str, span: Span) -> Model
             return _of_instance(run, value, name, span)
         case Module():
             return None if value.dynamic else value.names.get(name, MISSING)
+        case ScenarioCall():
+            if value.names is None:
+                raise NotBegun(Diagnostic("runtime-error", f"the scenario has no `{name}` before it begins", span))
+            return value.names.get(name, MISSING)
         case ScenicClass():
             return next((cls.attributes[name] for cls in value.ancestry() if name in cls.attributes), MISSING)
         case Network():

@@ -64,9 +64,13 @@ _OVER_TIME: ContextVar[bool] = ContextVar("_OVER_TIME", default=False)
 
 
 @contextmanager
-def read_over_time() -> Generator[None]:
-    """While a condition over time is evaluated: what it reads of objects is read at each sample."""
-    token = _OVER_TIME.set(True)
+def read_over_time(*, current: bool = True) -> Generator[None]:
+    """While a condition over time is evaluated: what it reads of objects is read at each sample.
+
+    Args:
+        current: Whether it is one: what makes objects within a run is not.
+    """
+    token = _OVER_TIME.set(current)
     try:
         yield
     finally:

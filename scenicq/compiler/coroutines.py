@@ -1,16 +1,17 @@
-"""What behaviors and monitors are before they run: definitions, and calls of these.
+"""What behaviors, monitors and scenarios are before they run: definitions, and calls of these.
 
-A call makes something that runs over time: `require monitor` runs a monitor, `with behavior` and `do` a behavior. The
-behaviors and actions of Scenic's libraries are known by their names.
+A call makes something that runs over time: `require monitor` runs a monitor, `with behavior` and `do` a behavior, `do`
+in what composes scenarios a scenario. The behaviors and actions of Scenic's libraries are known by their names.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TypeGuard, cast
 
 from scenicq.compiler.values import Function, ModelValue, fail
-from scenicq.errors import Span
+from scenicq.errors import ScenarioError, Span
 from scenicq.syntax import ast
 
 __all__ = [
@@ -40,8 +41,40 @@ class BehaviorDefinition(CoroutineDefinition):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class ScenarioDefinition(CoroutineDefinition):
+    """A scenario."""
+
+    @property
+    def setup(self) -> tuple[ast.Statement, ...]:
+        """What makes its objects and says what it requires."""
+        body = cast("tuple[ast.Statement, ...]", self.body)
+        if any(map(_is_block, body)):
+            return tuple(line for each in body if _is_block(each) and each.kind == "setup" for line in each.body)
+        return tuple(each for each in body if not _is_guard(each))
+
+    @property
+    def compose(self) -> tuple[ast.Statement, ...] | None:
+        """What runs other scenarios; None where nothing does."""
+        body = cast("tuple[ast.Statement, ...]", self.body)
+        blocks = [each.body for each in body if _is_block(each) and each.kind == "compose"]
+        return tuple(line for each in blocks for line in each) if blocks else None
+
+
+def _is_block(node: ast.Statement) -> TypeGuard[ast.DynamicDefinition]:
+    return isinstance(node, ast.DynamicDefinition) and node.kind in ("setup", "compose")
+
+
+def _is_guard(node: ast.Statement) -> bool:
+    return isinstance(node, ast.DynamicStatement) and node.kind in ("precondition", "invariant")
+
+
+class NotBegun(ScenarioError):
+    """What a scenario makes is read before it begins."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class CoroutineCall:
-    """A call of a monitor or behavior.
+    """A call of a monitor, behavior or scenario.
 
     Attributes:
         of: What is called.
@@ -52,6 +85,17 @@ class CoroutineCall:
     of: CoroutineDefinition
     given: Mapping[str, ModelValue]
     span: Span
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ScenarioCall(CoroutineCall):
+    """A call of a scenario.
+
+    Attributes:
+        names: What it has made, by name; None before it begins.
+    """
+
+    names: Mapping[str, ModelValue] | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -14,7 +14,7 @@ from scenicq.compiler.assignment import assign
 from scenicq.compiler.classes import bind_arguments, define_class, refuse_decorators
 from scenicq.compiler.coerce import to_region, to_scalar
 from scenicq.compiler.comparisons import binary, iterate
-from scenicq.compiler.coroutines import CoroutineCall, CoroutineDefinition
+from scenicq.compiler.coroutines import CoroutineCall, CoroutineDefinition, ScenarioCall, ScenarioDefinition
 from scenicq.compiler.courses import Course
 from scenicq.compiler.deviations import deviation, leaves_the_plane
 from scenicq.compiler.element_lookups import LaneRule, Lookups
@@ -24,6 +24,7 @@ from scenicq.compiler.expressions import evaluate
 from scenicq.compiler.items import items_of
 from scenicq.compiler.known_properties import known_truth
 from scenicq.compiler.logic import condition
+from scenicq.compiler.overrides import override
 from scenicq.compiler.recorded_values import RecordStatement, record_statement
 from scenicq.compiler.requirements import RequireStatement, requirement
 from scenicq.compiler.scoping import own_names
@@ -52,6 +53,7 @@ from scenicq.geometry.driven_courses import GAP_S
 from scenicq.geometry.network import Network
 from scenicq.geometry.regions import Everywhere
 from scenicq.syntax import ast
+from scenicq.syntax.walk import walk
 
 __all__ = ["Interpreter"]
 
@@ -88,9 +90,12 @@ class Interpreter:
         objects: The objects made so far.
         records: What results are to carry.
         params: Global parameters: value, place, whether a library sets it.
+        given_params: Those that have a value whatever the program says.
         excluded: Outcomes of random choices that no scene has.
         lookups: What the program asks about places of the map.
         timed: Takes what is said about time; None for a program that is matched at one instant.
+        overrides: Whether a scenario overrides what objects have.
+        is_initial: Whether what runs is the initial scenario.
         simulation: What `simulation()` gives; None before the program has run.
         course: Decides the tests of a condition on the scene while one is evaluated: there, no value of an object is
             known before a label tells it. None while the program itself runs.
@@ -107,9 +112,12 @@ class Interpreter:
     requirements: list[RequireStatement] = field(default_factory=list[RequireStatement])
     records: list[RecordStatement] = field(default_factory=list[RecordStatement])
     params: dict[str, tuple[ModelValue, Span, bool]] = field(default_factory=dict[str, Any])
+    given_params: frozenset[str] = frozenset()
     excluded: Exclusions = field(default_factory=Exclusions)
     lookups: Lookups = field(default_factory=Lookups)
     timed: TimedStatements | None = None
+    overrides: bool = False
+    is_initial: bool = True
     ignored: list[Diagnostic] = field(default_factory=list[Diagnostic])
     current_ego: Instance | None = None
     simulation: ModelValue = None
@@ -165,9 +173,11 @@ class Interpreter:
     ) -> ModelValue:
         """Call a function."""
         given = bind_arguments(function, args, named, span)
+        if isinstance(function, ScenarioDefinition):
+            return ScenarioCall(function, given, span)
         if isinstance(function, CoroutineDefinition):
             return CoroutineCall(function, given, span)
-        scope = Environment(given, cast(Environment, function.environment), own=self._own_names(function))
+        scope = Environment(given, cast(Environment, function.environment), own=self.own_names(function))
         self.budget.enter(span)
         try:
             if not isinstance(function.body, tuple):
@@ -179,7 +189,7 @@ class Interpreter:
             self.budget.leave()
         return None
 
-    def _own_names(self, function: Function) -> frozenset[str]:
+    def own_names(self, function: Function) -> frozenset[str]:
         """The names that a function binds; worked out once for each text of a function."""
         if not isinstance(function.body, tuple):
             return frozenset()
@@ -328,6 +338,8 @@ class Interpreter:
                 self.imports(node, scope)
             case ast.Param():
                 for item in node.items:
+                    if item.name in self.given_params:
+                        continue
                     self.params[item.name] = (evaluate(self, item.value, scope), item.span, scope.library)
             case ast.Require():
                 made = requirement(self, node, scope)
@@ -343,6 +355,18 @@ class Interpreter:
                 self.dynamic("simulator", node.span)
             case ast.DynamicStatement(kind="record" | "record initial" | "record final"):
                 record_statement(self, node, scope)
+            case ast.DynamicDefinition(kind="scenario"):
+                made = self.make_function(node.name, node.parameters, node.body, scope, node.span)
+                scope.set(
+                    node.name,
+                    ScenarioDefinition(made.name, made.parameters, made.defaults, made.body, scope, made.span),
+                )
+                self.overrides = self.overrides or any(isinstance(each, ast.Override) for each in walk(*node.body))
+            case ast.DynamicDefinition(kind="setup" | "compose"):
+                raise fail("parse-error", f"`{node.kind}` stands outside of a scenario", node.span, "no block here",
+                           ("write it within `scenario Name():`",))  # fmt: skip
+            case ast.Override():
+                override(self, node, scope)
             case ast.DynamicStatement() | ast.DynamicDefinition() | ast.RequireMonitor() if self.timed is not None:
                 timed_statement(self, self.timed, node, scope)
             case ast.Take() | ast.Do() | ast.TryInterrupt():

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from typing import cast
 
 from scenicq.compiler.contracts import Contract
-from scenicq.compiler.coroutines import CoroutineCall, LibraryCall
+from scenicq.compiler.coroutines import CoroutineCall, LibraryCall, ScenarioCall
 from scenicq.compiler.unread import NoValue
 from scenicq.compiler.values import Choice, Function, Instance, LabelObjects, ModelValue, OtherList, fail, is_node
 from scenicq.errors import Span
@@ -21,7 +21,11 @@ from scenicq.forest.nodes import PAST, Constant, Feature, Identity, Index, Leaf,
 from scenicq.forest.value_numbers import ValueNumbers
 from scenicq.forest.walk import is_leaf, leaves, postorder, transform
 
-__all__ = ["Held", "LocalValues"]
+__all__ = ["HERE", "Held", "LocalValues"]
+
+
+HERE = "here"
+"""What stands for the environment of a function that is defined where its variable is."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,12 +50,15 @@ class LocalValues:
         drawn_after: Random variables that are made later than this are drawn by the process.
         ranks: Which of several elements of the map that lie at a place is meant, by look-up and place: here the first
             one, as in Scenic.
+        of_scene: Those made in these stretches of identities are the scene's all the same: scenarios drew them that
+            began with it.
         numbers: Tells expressions apart.
     """
 
     process: int
     drawn_after: int
     ranks: Mapping[tuple[object, ...], Index]
+    of_scene: list[range] = field(default_factory=list[range])
     numbers: ValueNumbers = field(default_factory=ValueNumbers)
     _keys: dict[int, tuple[object, Hashable]] = field(default_factory=dict["int", "tuple[object, Hashable]"])
     _aged: dict[tuple[int, str, bool], tuple[object, Held]] = field(
@@ -85,11 +92,17 @@ class LocalValues:
                 return "dict", *((self._key(key), self._key(each)) for key, each in items)
             case Instance() if value.index is None and type(value) is Instance:
                 return "point", id(value.cls), *((key, self._key(each)) for key, each in value.properties.items())
+            case ScenarioCall():
+                given = ((key, self._key(each)) for key, each in value.given.items())
+                return "scenario", id(value.of), value.span, *given
             case CoroutineCall():
                 return "call", id(value.of), *((key, self._key(each)) for key, each in value.given.items())
             case LibraryCall():
                 named = ((key, self._key(each)) for key, each in value.named.items())
                 return "library", value.of.name, *map(self._key, value.positional), *named
+            case Function(environment="here"):
+                defaults = ((key, self._key(each)) for key, each in value.defaults.items())
+                return "function", id(value.body), *defaults
             case _ if is_node(value):
                 return "node", self.numbers.expression(cast(Node, value))
             case _:
@@ -119,6 +132,28 @@ class LocalValues:
             self._aged[asked] = held.value, self._made_old(held, place, first=first)
         return self._aged[asked][1]
 
+    def at_begin(self, value: ModelValue, place: str, *, first: bool) -> ModelValue:
+        """A value as a scenario gets it that begins: what is read at this sample is read once.
+
+        Args:
+            value: The value.
+            place: Where it is, in words that are no other variable's.
+            first: Whether the sample is the first one, which is kept; at others nothing is known of that.
+        """
+
+        def step(node: Node) -> Node:
+            if not isinstance(node, Feature) or node.property.startswith(PAST):
+                return node
+            if node.current or first:
+                return replace(node, current=False)
+            return replace(
+                node, property=f"{PAST}{place} in {self.process}: {node.object} {node.property}", current=True
+            )
+
+        if isinstance(value, Instance) and value.index is not None:
+            return value
+        return self._mapped(value, step)
+
     def reads_samples(self, value: ModelValue) -> bool:
         """Whether something of a value is read at each sample."""
         return any(map(_is_current, postorder(self.nodes(value))))
@@ -142,7 +177,11 @@ class LocalValues:
         """The random variables that a value was made of that are not those of the scene."""
         found = leaves(*self.nodes(value))
         ranks = self._current_ranks() if found else ()
-        return [leaf for leaf in found if leaf.identity.order > self.drawn_after or leaf.identity in ranks]
+        return [leaf for leaf in found if self._is_drawn(leaf.identity) or leaf.identity in ranks]
+
+    def _is_drawn(self, identity: Identity) -> bool:
+        """Whether the process has drawn a random variable."""
+        return identity.order > self.drawn_after and not any(identity.order in each for each in self.of_scene)
 
     def each(self, value: ModelValue, leaf: Index) -> list[ModelValue]:
         """A value for each way in which a choice that is drawn may come out."""
@@ -154,7 +193,7 @@ class LocalValues:
         return {
             rank.identity
             for (_, where, *_), rank in self.ranks.items()
-            if rank.identity.order > self.drawn_after or (isinstance(where, tuple) and where[-1] is True)
+            if self._is_drawn(rank.identity) or (isinstance(where, tuple) and where[-1] is True)
         }
 
     def without(self, value: ModelValue, leaf: Leaf, put: Node) -> ModelValue:

@@ -66,9 +66,9 @@ def _by_ego(sight: Callable[..., ModelValue], run: Interpreter, region: ModelVal
 
 
 def _initial(run: Interpreter, span: Span) -> ModelValue:
-    # the scene that is matched is the initial one
+    # but for scenarios that others run, the scene that is matched is the initial one
     run.dynamic("initial scenario", span)
-    return True
+    return run.is_initial
 
 
 _SEEN, _UNSEEN = (partial(_sight, each) for each in (operators.region_intersection, operators.region_difference))

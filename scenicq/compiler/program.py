@@ -5,7 +5,7 @@ A scenario is compiled once per map: the road network is part of the program's w
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from typing import TypeVar, cast
@@ -15,6 +15,7 @@ from scenicq.compiler import operators
 from scenicq.compiler.absent import check_directions, listed
 from scenicq.compiler.arithmetic import no_number
 from scenicq.compiler.coerce import PARTIAL, to_node, to_region, to_scalar, to_vector
+from scenicq.compiler.composition_graph import ComposedScenario
 from scenicq.compiler.deviations import is_zero
 from scenicq.compiler.element_lookups import LaneRule
 from scenicq.compiler.environment import Environment
@@ -22,10 +23,12 @@ from scenicq.compiler.imported_files import Loader
 from scenicq.compiler.imports import Modules
 from scenicq.compiler.interpreter import Interpreter
 from scenicq.compiler.models import default_library, is_anywhere
+from scenicq.compiler.modular import run_program, top_scenario
 from scenicq.compiler.recorded_values import recorded_values
 from scenicq.compiler.requirements import RequireStatement
 from scenicq.compiler.temporal import REACTION_S, Behaviors, TimedStatements
 from scenicq.compiler.values import Choice, Instance, ModelValue, fail, is_node
+from scenicq.compiler.variants import with_variants
 from scenicq.compiler.version_detection import decide_version
 from scenicq.errors import Diagnostic, ScenarioError, Source, Span
 from scenicq.forest.compute import fold
@@ -58,6 +61,8 @@ def compile_scenario(
     map_defaults: bool = True,
     gap_s: float = GAP_S,
     lanes: LaneRule = "along",
+    scenario: str | None = None,
+    params: Mapping[str, float | str] | None = None,
 ) -> Scenario:
     """Compile a program against a map.
 
@@ -75,6 +80,8 @@ def compile_scenario(
             else does. Without a map they never do, and the scenario's warnings say so.
         gap_s: Seconds without a label at which the course of a track is cut.
         lanes: Which of several lanes that contain an object are its own: those that lead its way, or all.
+        scenario: Which scenario of the program runs; `Main`, the only one, or the program itself if not given.
+        params: Values of global parameters, whatever the program says.
 
     Raises:
         ScenarioError: The program is wrong or uses what is not supported.
@@ -84,7 +91,8 @@ def compile_scenario(
             timed = None if initial or behaviors is None else TimedStatements(behaviors, reaction_s)
             return _compiled(
                 source, network, version, initial=initial, timed=timed, loader=loader, model=model,
-                map_defaults=map_defaults, gap_s=gap_s, lanes=lanes,
+                map_defaults=map_defaults, gap_s=gap_s, lanes=lanes, wanted=scenario,
+                params=params or {},
             )  # fmt: skip
     except Exhausted:
         what = f"evaluating the program takes more than {LIMITS.program_seconds:g} s"
@@ -104,17 +112,26 @@ def _compiled(
     map_defaults: bool,
     gap_s: float,
     lanes: LaneRule,
+    wanted: str | None,
+    params: Mapping[str, float | str],
 ) -> Scenario:
     module = parse(source, version)
     chosen = decide_version(module)
     world = Modules(network, chosen, initial, loader, map_defaults=map_defaults and bool(network.features))
     run = world.interpreter
     run.timed, run.gap_s, run.lanes = timed, gap_s, lanes
+    run.params.update({name: (value, _start(source), False) for name, value in params.items()})
+    run.given_params = frozenset(params)
     try:
         library = None if world.is_model_named(module) else model or _left_out(module, chosen)
         names = {} if library is None else dict(world.load(library, _start(source)).names)
         scope = Environment({}, Environment(names, world.base, library=True), user=True)
         run.run(module.body, scope)
+        top = top_scenario(module, scope, wanted)
+        if top is not None:
+            run_program(run, top)
+        if timed is not None:
+            timed.follow(run)
         warnings = _borrowed(module, scope, names, library) if model is None else ()
         if map_defaults and not network.features:
             warnings += _anywhere(run.objects)
@@ -182,10 +199,10 @@ _Result = TypeVar("_Result")
 
 def _no_ego(run: Interpreter, module: ast.Program, version: int) -> ScenarioError:
     for found in run.ignored:
-        if found.span is not None and found.span.text.startswith(("scenario", "setup")):
-            return fail("no-ego", "the program defines no ego outside of its dynamic parts", found.span,
-                        "what stands in here is not read",
-                        ("write the objects of the initial scene at the top level",))  # fmt: skip
+        if found.span is not None and found.span.text.startswith("compose"):
+            return fail("no-ego", "the scenario that the program runs sets up no ego", found.span,
+                        "what others make is not read: it is not there in the initial scene",
+                        ("make the ego in the `setup` block",))  # fmt: skip
     example = "ego = new Car" if version == 3 else "ego = Car"
     return fail("no-ego", "the program defines no ego", _start(module.source), "no object is called `ego`",
                 (f"name one object `ego`, as in `{example}`",))  # fmt: skip
@@ -202,9 +219,16 @@ def _scenario(
         _written(_at_the_end(requirement.condition, requirement.span), requirement.span) for requirement in hard
     ]
     dynamics, excluded = run.timed.dynamics(run) if run.timed is not None else (None, [])
+    composition = None if run.timed is None else run.timed.composition
     requirements += [_written(condition, span) for condition, span in (*run.excluded.conditions(), *excluded)]
+    owners: dict[int, int] = {}
+    for each in () if composition is None else composition.scenarios:
+        for written in _begun_with(each):
+            owners[id(written)] = each.number
+            requirements.append(written)
     requirements = [requirement for requirement in requirements if requirement is not None]
-    requirements += _built_in(run, ego)
+    if composition is None:
+        requirements += _built_in(run, ego)
     ego.label = "ego"
     records = recorded_values(run)
     names = _names(run.objects)
@@ -219,7 +243,7 @@ def _scenario(
         if value is not None and _is_feature(value)
     }
     assert ego.index is not None
-    return Scenario(
+    found = Scenario(
         module.source, version, network.name, objects, ego.index, tuple(requirements), params,
         tuple(number for number, each in enumerate(run.objects) if not _known(each, "allowCollisions")),
         tuple(
@@ -229,6 +253,22 @@ def _scenario(
         dynamics=dynamics,
         records=records,
     )  # fmt: skip
+    if composition is None:
+        return found
+    return with_variants(found, composition, owners, lambda index: _built_in(run, run.objects[index]))
+
+
+def _begun_with(scenario: ComposedScenario) -> list[Requirement]:
+    """What a scenario requires that makes objects, where it begins."""
+    if not scenario.objects:
+        return []
+    said = [
+        (_at_the_end(each.condition, each.span), each.span)
+        for each in scenario.made.requirements
+        if each.probability >= 1
+    ]
+    found = [_written(condition, span) for condition, span in (*said, *scenario.made.excluded)]
+    return [each for each in found if each is not None]
 
 
 def _soft_condition(requirement: RequireStatement) -> Node:

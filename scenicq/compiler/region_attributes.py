@@ -9,7 +9,9 @@ from inspect import signature
 from itertools import pairwise
 from typing import cast
 
-from shapely.geometry import LineString
+from shapely import union_all
+from shapely.geometry import LineString, Point
+from shapely.ops import nearest_points
 
 from scenicq.compiler import operators
 from scenicq.compiler.coerce import kind_of_model, to_scalar, to_vector
@@ -24,6 +26,7 @@ from scenicq.geometry.angles import heading_of
 from scenicq.geometry.regions import XY, PolygonSet, PolylineSet, Region, orientation_of
 from scenicq.geometry.road_direction import along_lines
 from scenicq.geometry.shapes import simple_parts
+from scenicq.limits import LIMITS
 
 __all__ = ["REGION_METHODS", "corner", "holds_regions", "of_region"]
 
@@ -58,6 +61,9 @@ def of_region(value: Node, name: str, span: Span) -> ModelValue:
             return Builtin(
                 name, lambda span, by, normalized=False: _point_along(region, by, span, normalized=normalized)
             )
+        case "project" if isinstance(value, Constant) and isinstance(value.value, PolylineSet):
+            lines = value.value
+            return Builtin(name, lambda span, point: _projected(lines, to_vector(point, span), span))
         case "length" if isinstance(value, Constant) and isinstance(value.value, PolylineSet):
             return float(sum(line.length for line in value.value.lines))
         case _:
@@ -142,6 +148,46 @@ def _sum_of_segments(corners: list[XY], distance: Node, span: Span) -> Node:
             place = build.vector_sum(place, build.scale(build.constant((u - x, v - y), span), share, span), span)
         passed += length
     return place
+
+
+def _projected(region: PolylineSet, point: Node, span: Span) -> Node:
+    """The point of lines that is nearest to a point: of several the first one."""
+    if isinstance(point, Constant):
+        lines = union_all(list(region.lines))
+        nearest = nearest_points(lines, Point(*cast("XY", point.value)))[0]
+        return build.constant((float(nearest.x), float(nearest.y)), span)
+    segments = [ends for line in region.pieces for ends in pairwise([(x, y) for x, y in line.simplify(0.0).coords])]
+    if len(segments) > LIMITS.projection_segments:
+        raise fail("budget-exceeded", f"the line has more than {LIMITS.projection_segments} segments", span,
+                   "a point that is not known is projected here", ("place something `on` the line",))  # fmt: skip
+    found: Node | None = None
+    least: Node | None = None
+    for start, end in segments:
+        place = _nearest_on(start, end, point, span)
+        away = build.norm(build.vector_difference(point, place, span), span)
+        if found is None or least is None:
+            found, least = place, away
+            continue
+        found = Select(build.compare(CompareOp.LT, away, least, span), (found, place), span=span)
+        least = build.arithmetic(ArithmeticOp.MIN, away, least, span=span)
+    assert found is not None
+    return found
+
+
+def _nearest_on(start: XY, end: XY, point: Node, span: Span) -> Node:
+    """The point of a segment that is nearest to a point."""
+    (x, y), (u, v) = start, end
+    along, square = (u - x, v - y), (u - x) ** 2 + (v - y) ** 2
+    offset = build.vector_difference(point, build.constant(start, span), span)
+    parts = [
+        build.arithmetic(
+            ArithmeticOp.MUL, build.coordinate(offset, axis), build.constant(along[axis] / square), span=span
+        )
+        for axis in (0, 1)
+    ]
+    share = build.arithmetic(ArithmeticOp.MAX, build.add(*parts, span), build.constant(0.0, span), span=span)
+    share = build.arithmetic(ArithmeticOp.MIN, share, build.constant(1.0, span), span=span)
+    return build.vector_sum(build.constant(start, span), build.scale(build.constant(along, span), share, span), span)
 
 
 def _line(value: ModelValue) -> list[tuple[float, float]] | None:

@@ -5,11 +5,22 @@ from __future__ import annotations
 from scenicq.syntax import ast
 from scenicq.syntax.walk import children
 
-__all__ = ["own_names"]
+__all__ = ["bound_names", "own_names"]
 
 
 def own_names(body: tuple[ast.Statement, ...]) -> frozenset[str]:
     """The names that statements bind in their own scope, not counting functions and classes inside."""
+    found, shared = _names(body)
+    return frozenset(found - shared)
+
+
+def bound_names(body: tuple[ast.Statement, ...]) -> frozenset[str]:
+    """The names that statements bind in their own scope or in one that they share."""
+    return frozenset(_names(body)[0])
+
+
+def _names(body: tuple[ast.Statement, ...]) -> tuple[set[str], set[str]]:
+    """The names that statements bind, and those that they share."""
     found: set[str] = set()
     shared: set[str] = set()
     stack: list[ast.SyntaxNode] = list(body)
@@ -32,7 +43,7 @@ def own_names(body: tuple[ast.Statement, ...]) -> frozenset[str]:
             case _:
                 pass
         stack.extend(children(node))
-    return frozenset(found - shared)
+    return found, shared
 
 
 def _targets(target: ast.Expression) -> list[str]:

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Literal, cast
 
 from scenicq.compiler.coerce import read_over_time
-from scenicq.compiler.coroutines import CoroutineCall, as_behavior
+from scenicq.compiler.composition_graph import Composition, CompositionGraph
+from scenicq.compiler.coroutines import CoroutineCall, ScenarioDefinition, as_behavior
+from scenicq.compiler.environment import Environment
 from scenicq.compiler.exclusions import with_exclusions
+from scenicq.compiler.local_values import LocalValues
 from scenicq.compiler.process_graph import process_of
+from scenicq.compiler.process_states import GraphGuards
 from scenicq.compiler.step_times import simulation, step_seconds
 from scenicq.compiler.values import Instance, ModelValue, fail
-from scenicq.errors import Diagnostic, Span
-from scenicq.forest.nodes import Constant, Feature, Node
+from scenicq.errors import Diagnostic, Note, Source, Span
+from scenicq.forest.nodes import Constant, Feature, Identity, Node
 from scenicq.forest.temporal import (
     Always,
     And,
@@ -25,6 +29,8 @@ from scenicq.forest.temporal import (
     Not,
     Or,
     Process,
+    PutBehavior,
+    SubScenario,
     TemporalRequirement,
     Termination,
     Until,
@@ -43,6 +49,10 @@ REACTION_S = 1.0
 """Seconds after which what an object does must be seen, unless it is said."""
 Behaviors = Literal["motion", "guards", "ignore"]
 """What becomes of behaviors: what they do must be seen, too; they run, and let every action pass; they are left out."""
+
+
+_NO_PROCESS = Process(Span(Source("", ""), 0, 0), ())
+"""What stands for a process that is being followed."""
 
 
 def _implication(left: Formula, right: Formula) -> Formula:
@@ -78,24 +88,38 @@ class TimedStatements:
         reaction_s: Seconds after which what an object does must be seen.
         used: Whether the program has any statement about time: it is a dynamic one.
         actions: The actions of behaviors that constrain nothing, each with its first place.
+        conditions: What computes the conditions on one sample.
+        requirements: Requirements with operators of time.
+        terminations: What ends a run.
+        monitors: Monitors that are required.
+        agents: Objects with their behaviors.
+        overrides: Objects whose behavior is another one.
+        composition: What composes scenarios, once it has been followed.
     """
 
     behaviors: Behaviors
     reaction_s: float = REACTION_S
     used: bool = False
-    _conditions: list[Callable[[], Node]] = field(default_factory=list[Callable[[], Node]])
-    _requirements: list[TemporalRequirement] = field(default_factory=list[TemporalRequirement])
-    _terminations: list[Termination] = field(default_factory=list[Termination])
-    _monitors: list[tuple[CoroutineCall, Span]] = field(default_factory=list["tuple[CoroutineCall, Span]"])
-    _behaviors: list[tuple[Instance, ModelValue, Span]] = field(
+    actions: dict[str, Span] = field(default_factory=dict[str, Span])
+    conditions: list[Callable[[], Node]] = field(default_factory=list[Callable[[], Node]])
+    requirements: list[TemporalRequirement] = field(default_factory=list[TemporalRequirement])
+    terminations: list[Termination] = field(default_factory=list[Termination])
+    monitors: list[tuple[CoroutineCall, Span]] = field(default_factory=list["tuple[CoroutineCall, Span]"])
+    agents: list[tuple[Instance, ModelValue, Span]] = field(default_factory=list["tuple[Instance, ModelValue, Span]"])
+    overrides: list[tuple[Instance, ModelValue, Span]] = field(
         default_factory=list["tuple[Instance, ModelValue, Span]"]
     )
-    actions: dict[str, Span] = field(default_factory=dict[str, Span])
+    composition: Composition | None = None
+    _top: tuple[CoroutineCall, Environment] | None = None
+    _nodes: list[Node] = field(default_factory=list[Node])
+    _processes: list[Process] = field(default_factory=list[Process])
+    _numbers: ValueNumbers = field(default_factory=ValueNumbers)
+    _known: dict[int, Atom] = field(default_factory=dict[int, Atom])
 
     def require(self, deferred: Deferred, wanted: ast.Expression, span: Span) -> None:
         """Add a requirement with an operator of time."""
         self.used = True
-        self._requirements.append(TemporalRequirement(self._formula(deferred, wanted), span))
+        self.requirements.append(TemporalRequirement(self._formula(deferred, wanted), span))
 
     def end(
         self, span: Span, *, condition: Callable[[], Node] | None = None, after_s: float | None = None,
@@ -104,24 +128,96 @@ class TimedStatements:
         """Add what ends a run."""
         self.used = True
         atom = None if condition is None else self.atom(condition)
-        self._terminations.append(Termination(span, atom, after_s, simulation))
+        self.terminations.append(Termination(span, atom, after_s, simulation))
 
     def watch(self, monitor: CoroutineCall, span: Span) -> None:
         """Add a monitor."""
         self.used = True
-        self._monitors.append((monitor, span))
+        self.monitors.append((monitor, span))
 
     def behave(self, agent: Instance, behavior: ModelValue, span: Span) -> None:
         """Add the behavior of an object, if it is not None."""
         behavior = as_behavior(behavior, span)
         if behavior is not None:
             self.used = True
-            self._behaviors.append((agent, behavior, span))
+            self.agents.append((agent, behavior, span))
 
     def atom(self, condition: Callable[[], Node]) -> Atom:
         """A condition on one sample."""
-        self._conditions.append(condition)
-        return Atom(len(self._conditions) - 1)
+        self.conditions.append(condition)
+        return Atom(len(self.conditions) - 1)
+
+    def apart(self) -> TimedStatements:
+        """What takes what a scenario says that begins within a run."""
+        return TimedStatements(self.behaviors, self.reaction_s, actions=self.actions)
+
+    def override(self, instance: Instance, behavior: ModelValue, span: Span) -> None:
+        """Put another behavior for that of an object."""
+        self.used = True
+        self.overrides.append((instance, as_behavior(behavior, span), span))
+
+    def enter(self, span: Span, ignored: list[Diagnostic]) -> None:
+        """Leave out what counts only where the program itself runs, and no scenario of it: as Scenic does."""
+        left = [each.span for each in self.terminations] + [place for _, place in self.monitors]
+        for place in left:
+            message = "this does not count: a scenario of the program runs"
+            notes, hints = (Note(span, "this runs"),), ("write it in this scenario",)
+            told = Diagnostic(
+                "unsupported-construct", message, place, "outside of the scenario", notes, hints, "warning"
+            )
+            ignored.append(told)
+        self.terminations, self.monitors = [], []
+
+    def compose(self, call: CoroutineCall, scope: Environment) -> None:
+        """Take the scenario that the program runs, once it has been set up."""
+        definition = cast(ScenarioDefinition, call.of)
+        if definition.compose is not None or definition.guards("precondition", "invariant"):
+            self.used = True
+            self._top = call, scope
+
+    def follow(self, run: Interpreter) -> None:
+        """Follow what composes scenarios, once the program has run: what these make are objects of the scenario, too.
+
+        Raises:
+            ScenarioError: What is wrong with it; see `process_of`.
+        """
+        if self._top is None:
+            return
+        run.simulation = simulation(run)
+        call, scope = self._top
+        values = LocalValues(-1, Identity().order, run.lookups.ranks)
+        reaction_s = self.reaction_s if self.behaviors == "motion" else None
+
+        def adds(
+            what: ModelValue, agent: Instance | None, span: Span, scenario: int, overrides: bool
+        ) -> tuple[int, Sequence[tuple[GraphGuards, Node, Span]]]:
+            number = len(self._processes)
+            self._processes.append(_NO_PROCESS)
+            owner = next((each.number for each in graph.scenarios if agent in each.objects), -1)
+            own = LocalValues(number, values.drawn_after, run.lookups.ranks, values.of_scene)
+            process, asked = process_of(
+                run, as_behavior(what, span), number, agent, self._atom, step_seconds, self.actions, span, reaction_s,
+                values=own, scenario=owner if agent is not None else scenario,
+            )  # fmt: skip
+            self._processes[number] = replace(process, overrides=overrides)
+            return number, asked
+
+        definition = cast(ScenarioDefinition, call.of)
+        graph = CompositionGraph(
+            run, self._atom, None, values, step_seconds, {}, call.span, self.actions, None, top=call, adds=adds,
+            has_setup=bool(definition.setup),
+        )  # fmt: skip
+        self.composition = graph.composition(scope.names)
+        if run.current_ego is None:
+            run.current_ego = next((each.made.ego for each in graph.scenarios if each.made.ego is not None), None)
+
+    def _atom(self, node: Node) -> Atom:
+        """The number of a condition that a process reads; those of requirements and ends come before."""
+        number = self._numbers.expression(node)
+        if number not in self._known:
+            self._known[number] = Atom(len(self.conditions) + len(self._nodes))
+            self._nodes.append(node)
+        return self._known[number]
 
     def dynamics(self, run: Interpreter) -> tuple[Dynamics | None, list[tuple[Node, Span]]]:
         """What has been collected, None for a static program; and what of it excludes scenes, whatever the sample.
@@ -136,48 +232,66 @@ class TimedStatements:
             return None, []
         run.simulation = simulation(run)
         with read_over_time():
-            nodes, always = with_exclusions(run, lambda: [condition() for condition in self._conditions])
-        for requirement in self._requirements:
+            nodes, always = with_exclusions(run, lambda: [condition() for condition in self.conditions])
+        for requirement in self.requirements:
             if _known(requirement.formula, nodes) is False:
                 raise fail(
                     "impossible-requirement", "no run satisfies this requirement", requirement.span, "always false"
                 )
-        requirements, excluded = list(self._requirements), list[tuple[Node, Span]]()
+        requirements, excluded = list(self.requirements), list[tuple[Node, Span]]()
         for condition, span in always:
             if any(isinstance(node, Feature) and node.current for node in postorder([condition])):
-                requirements.append(TemporalRequirement(Always(Atom(len(nodes))), span))
-                nodes.append(condition)
+                requirements.append(TemporalRequirement(Always(self._atom(condition)), span))
             else:
                 excluded.append((condition, span))
-        processes = self._processes(run, nodes, requirements)
-        return Dynamics(tuple(nodes), tuple(requirements), tuple(self._terminations), processes), excluded
+        self._follow_processes(run, requirements)
+        processes, scenarios = self._in_order()
+        conditions = (*nodes, *self._nodes)
+        dynamics = Dynamics(conditions, tuple(requirements), tuple(self.terminations), processes, scenarios)
+        return dynamics, excluded
 
-    def _processes(
-        self, run: Interpreter, nodes: list[Node], requirements: list[TemporalRequirement]
-    ) -> tuple[Process, ...]:
-        """Monitors and behaviors; what they read is added to the conditions, what they ask for first is required."""
-        numbers, known = ValueNumbers(), dict[int, Atom]()
-
-        def atom(node: Node) -> Atom:
-            number = numbers.expression(node)
-            if number not in known:
-                known[number] = Atom(len(nodes))
-                nodes.append(node)
-            return known[number]
-
-        found: list[Process] = []
-        calls = [(None, call, span) for call, span in self._monitors] + self._behaviors
-        for number, (agent, call, span) in enumerate(calls):
+    def _follow_processes(self, run: Interpreter, requirements: list[TemporalRequirement]) -> None:
+        """Follow the program's own monitors and behaviors; what they ask for first is required."""
+        overridden = {id(instance) for instance, _, _ in self.overrides}
+        agents = [each for each in self.agents if id(each[0]) not in overridden]
+        agents += [each for each in self.overrides if each[1] is not None]
+        for agent, call, span in [*((None, call, span) for call, span in self.monitors), *agents]:
             reaction_s = self.reaction_s if self.behaviors == "motion" else None
-            process, asked = process_of(run, call, number, agent, atom, step_seconds, self.actions, span, reaction_s)
-            found.append(process)
+            process, asked = process_of(
+                run, call, len(self._processes), agent, self._atom, step_seconds, self.actions, span, reaction_s
+            )
+            self._processes.append(process)
             for guards, node, place in asked:
                 wanted = [*guards, (node, place)]
-                requirements += [TemporalRequirement(atom(each), where) for each, where in wanted]
+                requirements += [TemporalRequirement(self._atom(each), where) for each, where in wanted]
         for name, place in self.actions.items() if self.behaviors == "motion" else ():
             message = f"what `{name}` does is not compared"
             run.ignored.append(Diagnostic("unseen-action", message, place, severity="note"))
-        return tuple(found)
+
+    def _in_order(self) -> tuple[tuple[Process, ...], tuple[SubScenario, ...]]:
+        """The processes in the order in which they run, and the scenarios that begin within a run."""
+        composition = self.composition
+        if composition is None:
+            return tuple(self._processes), ()
+        # monitors, then behaviors by when their objects are made
+        order = sorted(
+            range(len(self._processes)),
+            key=lambda number: -1 if (owner := self._processes[number].object) is None else owner,
+        )
+        places = {number: place for place, number in enumerate(order, 1)} | {-1: -1}
+
+        def placed(process: Process) -> Process:
+            steps = tuple(
+                replace(step, process=places[step.process]) if isinstance(step, PutBehavior) else step
+                for step in process.steps
+            )
+            return replace(process, steps=steps)
+
+        scenarios = tuple(
+            replace(each, processes=tuple(places[number] for number in each.processes))
+            for each in composition.as_scenarios()
+        )
+        return (placed(composition.process), *(placed(self._processes[number]) for number in order)), scenarios
 
     def _formula(self, deferred: Deferred, node: ast.Expression) -> Formula:
         if not is_temporal(node):

@@ -22,7 +22,6 @@ _OF_BEHAVIORS = frozenset(
     ("behavior", "with behavior", "do", "do choose", "do shuffle", "take", "wait", "wait for", "wait until", "abort",
      "invoke", "override", "try/interrupt", "precondition", "invariant")
 )  # fmt: skip
-_MODULAR = frozenset(("scenario", "setup", "compose", "override"))
 _SILENT = frozenset(("simulator", "initial scenario"))
 """What says nothing about whether a recording matches."""
 
@@ -83,10 +82,6 @@ def leave_out(timed: TimedStatements, ignored: list[Diagnostic], kind: str, span
     if kind in _SILENT:
         return
     timed.used = True
-    if kind in _MODULAR:
-        raise fail("unsupported-construct", f"`{kind}` is not supported", span, "a scenario made of others",
-                   ("write the objects at the top level",
-                    "`--initial` matches the initial scene of what stands there"))  # fmt: skip
     is_import = kind.startswith("import of ")
     if kind not in _OF_BEHAVIORS and not is_import:
         raise fail("unsupported-construct", f"`{kind}` cannot stand here", span, "no statement of a top level")

@@ -117,6 +117,8 @@ class Scenario:
         warnings: What the author should know.
         records: What results carry.
         dynamics: What it says about time; None for a static program, and where that is left out.
+        variants: Where runs have other objects than others: the scenario of each case; it itself has those that are
+            there in all of them.
         as_written: Where expressions were rewritten to be matched, which keeps outcomes but not their probabilities:
             the scenario as the program has it, from which scenes are drawn.
     """
@@ -134,4 +136,5 @@ class Scenario:
     warnings: tuple[Diagnostic, ...] = field(default=())
     dynamics: Dynamics | None = None
     records: tuple[RecordedValue, ...] = ()
+    variants: tuple[Scenario, ...] = field(default=(), repr=False)
     as_written: Scenario | None = field(default=None, repr=False)

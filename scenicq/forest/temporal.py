@@ -6,7 +6,8 @@ atoms are boolean expressions of the forest, read at one sample of a recording.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import TypeAlias
 
 from scenicq.errors import Span
@@ -17,6 +18,8 @@ __all__ = [
     "And",
     "Arm",
     "Atom",
+    "Begin",
+    "CheckSample",
     "Choose",
     "Due",
     "Dynamics",
@@ -24,12 +27,17 @@ __all__ = [
     "Eventually",
     "Formula",
     "Goto",
+    "IfRuns",
+    "Leave",
     "Next",
     "Not",
     "Or",
     "Process",
     "ProcessStep",
+    "PutBehavior",
     "Reject",
+    "Stop",
+    "SubScenario",
     "TemporalRequirement",
     "Terminate",
     "Termination",
@@ -223,15 +231,89 @@ class End:
     """The process is over, and says nothing any more."""
 
 
-ProcessStep: TypeAlias = Test | Goto | Wait | Arm | Due | Choose | Terminate | Reject | End
+@dataclass(frozen=True, slots=True)
+class Begin:
+    """A scenario begins, with its monitors and the behaviors of its objects; goes on within the same sample."""
+
+    scenario: int
+    then: int
+
+
+@dataclass(frozen=True, slots=True)
+class CheckSample:
+    """The requirements of a scenario read the sample; goes on within it."""
+
+    scenario: int
+    then: int
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """A scenario ends if it runs, with those that it runs: its requirements must hold; goes on within the sample."""
+
+    scenario: int
+    then: int
+
+
+@dataclass(frozen=True, slots=True)
+class Leave:
+    """What a scenario runs (-1: the program) is left: no monitor of theirs runs any more; goes on within the sample."""
+
+    scenario: int
+    then: int
+
+
+@dataclass(frozen=True, slots=True)
+class IfRuns:
+    """Goes on with one of two steps, within the same sample, by whether a scenario runs."""
+
+    scenario: int
+    then: int
+    otherwise: int
+
+
+@dataclass(frozen=True, slots=True)
+class PutBehavior:
+    """An object behaves in another way until a scenario (-1: the program) ends; goes on within the same sample.
+
+    Attributes:
+        scenario: The scenario.
+        object: The object.
+        process: Its behavior; -1 for none.
+        then: The step.
+    """
+
+    scenario: int
+    object: int
+    process: int
+    then: int
+
+
+ProcessStep: TypeAlias = (
+    Test
+    | Goto
+    | Wait
+    | Arm
+    | Due
+    | Choose
+    | Terminate
+    | Reject
+    | End
+    | Begin
+    | CheckSample
+    | Stop
+    | Leave
+    | IfRuns
+    | PutBehavior
+)
 
 
 def successors(step: ProcessStep) -> tuple[int, ...]:
     """The steps that may follow one within the same sample."""
     match step:
-        case Test() | Due():
+        case Test() | Due() | IfRuns():
             return step.then, step.otherwise
-        case Goto() | Arm():
+        case Goto() | Arm() | Begin() | CheckSample() | Stop() | Leave() | PutBehavior():
             return (step.then,)
         case Choose():
             return step.options
@@ -241,23 +323,46 @@ def successors(step: ProcessStep) -> tuple[int, ...]:
 
 @dataclass(frozen=True, slots=True)
 class Process:
-    """A monitor, or the behavior of an object, as a graph of steps, of which it goes through some at each sample.
+    """A monitor, the behavior of an object, or what composes scenarios: a graph of steps, some for each sample.
 
     Attributes:
-        span: Where the program requires it, or gives it to the object.
+        span: Where the program requires it, gives it to the object, or defines the scenario.
         steps: They refer to each other by their numbers, and it begins with the first. A run in which it goes in a
             circle without a `Wait` is none.
-        object: Whose behavior it is; None for a monitor.
+        object: Whose behavior it is; None for what is none.
+        composes: Whether it runs scenarios: it comes before monitors.
+        overrides: Whether it is a behavior that is put for another one, and does not begin by itself.
+        afresh: For steps at which it may stand between samples those at which it goes on after it was overridden.
     """
 
     span: Span
     steps: tuple[ProcessStep, ...]
     object: int | None = None
+    composes: bool = False
+    overrides: bool = False
+    afresh: Mapping[int, int] = field(default_factory=dict[int, int])
 
     @property
     def terminates(self) -> bool:
         """Whether it may end the run."""
         return any(isinstance(step, Terminate) for step in self.steps)
+
+
+@dataclass(frozen=True, slots=True)
+class SubScenario:
+    """A scenario that begins within a run.
+
+    Attributes:
+        span: Where the program runs it.
+        parent: The number of the scenario that runs it; -1 for the program.
+        requirements: Requirements with operators of time, from its first sample to its last.
+        processes: The numbers of its monitors, and of the behaviors of its objects.
+    """
+
+    span: Span
+    parent: int = -1
+    requirements: tuple[TemporalRequirement, ...] = ()
+    processes: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -268,13 +373,23 @@ class Dynamics:
         conditions: Boolean expressions, each about one sample: what atoms are.
         requirements: Requirements with operators of time.
         terminations: What ends a run; without any it may end anywhere.
-        processes: Monitors that are required, then behaviors of objects, in the order in which they run.
+        processes: What composes scenarios, monitors that are required, then behaviors of objects, in the order in
+            which they run.
+        scenarios: Scenarios that begin within a run.
+        needs: The numbers of those that have begun in every run that matches.
     """
 
     conditions: tuple[Node, ...] = ()
     requirements: tuple[TemporalRequirement, ...] = ()
     terminations: tuple[Termination, ...] = ()
     processes: tuple[Process, ...] = ()
+    scenarios: tuple[SubScenario, ...] = ()
+    needs: tuple[int, ...] = ()
+
+    @property
+    def every_requirement(self) -> tuple[TemporalRequirement, ...]:
+        """Its requirements, then those of its scenarios."""
+        return (*self.requirements, *(own for each in self.scenarios for own in each.requirements))
 
     @property
     def terminates(self) -> bool:

@@ -128,7 +128,7 @@ class View:
 
 
 def view_of(label: Label, roles: tuple[Role, ...], half: float | None = None) -> View:
-    """The surroundings of the ego, so large that every role is seen.
+    """Choose a square around the ego in which every role is seen.
 
     Args:
         label: The label.
@@ -143,7 +143,7 @@ def view_of(label: Label, roles: tuple[Role, ...], half: float | None = None) ->
 
 
 def plane_of(label: Label) -> Plane:
-    """A plane with its origin near the ego, on whole metres."""
+    """Make a plane with its origin near the ego, on whole metres."""
     return Plane((math.floor(label.ego.x), math.floor(label.ego.y)))
 
 
@@ -176,14 +176,14 @@ def _furniture(plane: Plane, view: View) -> str:
 
 
 def ground(plane: Plane, bounds: Bounds) -> str:
-    """What lies under the map, within bounds in metres."""
+    """Draw the ground under the map, within bounds in metres."""
     left, top = plane.at(bounds[0], bounds[3])
     right, bottom = plane.at(bounds[2], bounds[1])
     return element("rect", class_="ground", x=left, y=top, width=right - left, height=bottom - top)
 
 
 def draw_shot(shot: Shot, plane: Plane, view: View, letters: float = LETTERS) -> str:
-    """All of a picture but the map: overlay, boxes, names, scale and north.
+    """Draw all of a picture but the map: overlay, boxes, names, scale and north.
 
     Args:
         shot: The frame.
@@ -253,7 +253,7 @@ def caption(shot: Shot) -> list[tuple[str, str]]:
 
 
 def stylesheet(*, dark: bool = True) -> str:
-    """The style of pictures; without the rules for dark surroundings for renderers that know no media queries."""
+    """The style of pictures; without the rules for dark mode where a renderer knows no media queries."""
     text = resources.files("scenicq.report").joinpath("assets", "picture.css").read_text(encoding="utf-8")
     return text if dark else text.partition("@media")[0]
 
@@ -268,7 +268,7 @@ def draw(
     captioned: bool = True,
     letters: float = LETTERS,
 ) -> str:
-    """A frame as a file of SVG.
+    """Draw a frame as a file of SVG.
 
     Args:
         shot: The frame.

@@ -129,7 +129,7 @@ class MapIndex:
         return found
 
     def road_directions(self, xy: NDArray[np.float64]) -> list[tuple[float, ...]]:
-        """The headings that lanes have at positions of shape (n, 2); none where they have none."""
+        """The headings of the lanes at positions of shape (n, 2); none off the lanes."""
         return self._direction.values_many(xy)
 
 

@@ -1,4 +1,4 @@
-"""From rows back to labels, in batches.
+"""Read labels from rows, in batches.
 
 Parts of one number hold the same recordings, and each row of `labels` says where its rows in the other tables begin; so
 reading needs no join, and of chosen frames only the row groups that hold them are read.
@@ -38,9 +38,9 @@ __all__ = [
 
 _BATCH = 2048
 _FEW = 64
+"""Texts that are decoded one by one."""
 LAST = "last_lane"
 """The column of the last lane of a track."""
-"""Texts that are decoded one by one."""
 OBJECT_COLUMNS = ["id", "class", "source_class", "x", "y", "heading", "width", "length", "height", "vx", "vy"]
 OBJECT_COLUMNS.extend(("track", "attributes", LAST))
 MOTION_COLUMNS = ["motion_vx", "motion_vy", "acceleration", "yaw_rate", "motion_derived"]
@@ -61,7 +61,7 @@ def read_labels(
     space: bool = True,
     recorded: RecordedTracks | None = None,
 ) -> Iterator[Label]:
-    """Labels in the order of the store.
+    """Read labels in the order of the store.
 
     Args:
         parts: Files of the tables `labels`, `objects` and `sensors`, part by part.
@@ -160,14 +160,14 @@ class RowFile:
 def assemble(
     frames: ArrowTable, objects: ArrowTable, sensors: ArrowTable, recorded: RecordedTracks | None = None
 ) -> Iterator[Label]:
-    """Labels from rows.
+    """Make labels of rows.
 
     Args:
         frames: `LABEL_COLUMNS` and `EGO_COLUMNS` of each label; its counts say how many rows of the others are its own.
         objects: `OBJECT_COLUMNS`, label by label; both may have `MOTION_COLUMNS` and `OUT_OF_PLANE`, too, and may lack
             columns of what nobody looks at.
         sensors: Channels and paths, label by label; it may have `CAMERA_COLUMNS`.
-        recorded: As of `read_labels`.
+        recorded: As `read_labels` has it.
     """
     others = _objects([_values(objects, name) for name in OBJECT_COLUMNS], objects, "")
     egos = _objects([["ego"] * len(frames), *(_values(frames, name) for name in EGO_COLUMNS)], frames, "ego_")
@@ -216,7 +216,7 @@ def _objects(columns: list[list[Any]], table: ArrowTable, prefix: str) -> list[L
 
 
 def _values(table: ArrowTable, name: str) -> list[Any]:
-    """A column as Python values: null becomes None, JSON what it says; equal JSON texts share one value.
+    """Python values of a column: null becomes None, and JSON is read; equal texts share one value.
 
     A column that was not read is null everywhere.
     """

@@ -1,4 +1,4 @@
-"""From the columns of one recording to rows of every table, with what is computed at ingest."""
+"""Make rows of every table from the columns of one recording, with what is computed at ingest."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ __all__ = ["recording_rows"]
 def recording_rows(
     columns: RecordingColumns, index: MapIndex | None, *, first_object: int = 0, first_sensor: int = 0
 ) -> dict[str, ArrowTable]:
-    """Rows of `labels`, `objects`, `memberships` and `sensors`.
+    """Make the rows of `labels`, `objects`, `memberships` and `sensors`.
 
     Args:
         columns: The recording.
@@ -115,7 +115,7 @@ class _Placed:
         near: Regions near each.
         lane: Number of the lane of each; -1 for none, shape (n,).
         place: Number of the place of each; who stands at the same place has the same, shape (n,).
-        directions: Of the road at each place.
+        directions: The road's directions at each place.
     """
 
     near: Memberships
@@ -125,7 +125,7 @@ class _Placed:
 
 
 def _placed(index: MapIndex | None, xy: NDArray[np.float64]) -> _Placed:
-    """What a map says of positions (n, 2): asked once for all who stand at the same place."""
+    """Ask a map about positions (n, 2), each distinct one once."""
     n = len(xy)
     if index is None:
         nobody = np.empty(0, dtype=np.int64)

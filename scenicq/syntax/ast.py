@@ -596,8 +596,7 @@ class DynamicStatement(SyntaxNode):
     """A statement of one line about what happens over time.
 
     Kinds: `terminate when`, `terminate after`, `terminate simulation`, `terminate`, `record`, `record initial`,
-    `record final`, `wait`, `wait for`, `wait until`, `abort`, `override`, `precondition`, `invariant`; of `record` and
-    `override` only the place is kept.
+    `record final`, `wait`, `wait for`, `wait until`, `abort`, `precondition`, `invariant`.
 
     Attributes:
         kind: Which.
@@ -613,6 +612,19 @@ class DynamicStatement(SyntaxNode):
     unit: str = ""
     name: str = ""
     manners: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Override(SyntaxNode):
+    """`override object specifiers`: other properties of an object while a scenario runs."""
+
+    target: Expression
+    specifiers: tuple[Specifier, ...]
+
+    @property
+    def kind(self) -> str:
+        """What messages call it."""
+        return "override"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -679,14 +691,13 @@ class TryInterrupt(SyntaxNode):
 class DynamicDefinition(SyntaxNode):
     """A definition of what happens over time; unnamed blocks have no name.
 
-    Kinds: `behavior`, `monitor`, `scenario`, `setup`, `compose`, `precondition`, `invariant`. The span ends with the
-    header's colon. What is no behavior and no monitor is kept as a place only.
+    Kinds: `behavior`, `monitor`, `scenario`, `setup`, `compose`. The span ends with the header's colon.
 
     Attributes:
         kind: Which.
         name: Its name.
-        parameters: What a behavior or monitor takes.
-        body: What it does.
+        parameters: What it takes.
+        body: What it does; of a scenario its blocks, or what it sets up.
     """
 
     kind: str
@@ -745,6 +756,6 @@ Statement: TypeAlias = (
     ExpressionStatement | Assign | AugmentedAssign | AnnotatedAssign | If | For | While | Break | Continue | Pass
     | FunctionDef | Return | Delete | Assert | Raise | Try | WithStatement | PropertyDefault | ClassDef | Import
     | ImportFrom | Global | Nonlocal | UnsupportedStatement | Model | Param | Require | RequireMonitor | Mutate
-    | Simulator | DynamicStatement | DynamicDefinition | Take | Do | TryInterrupt
+    | Simulator | DynamicStatement | DynamicDefinition | Override | Take | Do | TryInterrupt
 )  # fmt: skip
 """What stands in a block."""

@@ -22,14 +22,14 @@ _NOT_AFTER_WORD = frozenset(
      "^=", "@=", ":=", "==", "!=", "<", "<=", ">", ">=", "*", "/", "//", "%", "**", "@", "+", "&", "|", "^")
 )  # fmt: skip
 _DEFINITIONS = frozenset(("behavior", "monitor", "scenario"))
-_BLOCKS = frozenset(("setup", "compose", "precondition", "invariant"))
+_BLOCKS = frozenset(("setup", "compose"))
 
 
 class ProgramParser(ExpressionParser):
     """Reads whole programs."""
 
     guarded = False
-    """Whether the body of a behavior or monitor is read, where `precondition:` and `invariant:` may stand."""
+    """Whether the body of a behavior, monitor or scenario is read: `precondition:` and `invariant:` may stand there."""
 
     # --- blocks, and Python's statements that have one
 
@@ -506,7 +506,9 @@ class ProgramParser(ExpressionParser):
                 return ast.Simulator(self.span(start), value)
             case word if word in _DEFINITIONS and self.takes_name():
                 return self.definition(word)
-            case word if word in _BLOCKS and self.peek().text == ":" and self.peek(2).kind == "newline":
+            case word if (
+                word in _BLOCKS and self.peek().text == ":" and (self.guarded or self.peek(2).kind == "newline")
+            ):
                 return self.definition(word)
             case word:
                 return self.dynamic(word)
@@ -585,23 +587,11 @@ class ProgramParser(ExpressionParser):
         return ast.Mutate(self.span(start), tuple(objects), scale)
 
     def definition(self, kind: str) -> ast.Statement:
-        """Read a behavior or monitor, or read past another definition of what happens over time."""
+        """Read a behavior, monitor or scenario, or one of the blocks of a scenario."""
         start = self.advance().start
         name = self.advance().text if kind in _DEFINITIONS else ""
-        if kind in ("behavior", "monitor"):
-            return self.coroutine(start, kind, name)
-        if self.text == "(":
-            self.move(self.closing(self.index))
-            self.advance()
-        self.expect(":", f"after the header of the {kind}")
-        node = ast.DynamicDefinition(self.span(start), kind, name)
-        self.skip()
-        return node
-
-    def coroutine(self, start: int, kind: str, name: str) -> ast.Statement:
-        """Read the parameters of a behavior or monitor, if it has any, and its body."""
         parameters: tuple[ast.Parameter, ...] = ()
-        if self.accept("("):
+        if kind in _DEFINITIONS and self.accept("("):
             parameters = self.parameters(")")
             self.advance()
         header = Span(self.source, start, self.token.end)
@@ -609,6 +599,17 @@ class ProgramParser(ExpressionParser):
         body = self.block(f"the header of the {kind}")
         self.guarded = around
         return ast.DynamicDefinition(header, kind, name, parameters, body)
+
+    def override(self) -> ast.Statement:
+        """Read `override object specifiers`."""
+        start = self.advance().start
+        target = self.postfix(self.token.start, self.atom())
+        specifiers = [self.specifier()]
+        while self.accept(","):
+            if self.at_line_end():
+                break
+            specifiers.append(self.specifier())
+        return ast.Override(self.span(start), target, tuple(specifiers))
 
     def guard(self, kind: str) -> ast.Statement:
         """Read `precondition: condition` or `invariant: condition`."""
@@ -704,6 +705,8 @@ class ProgramParser(ExpressionParser):
             return self.do()
         if word == "take":
             return self.take()
+        if word == "override":
+            return self.override()
         if kind.startswith("record"):
             return self.record(kind)
         start = self.token.start

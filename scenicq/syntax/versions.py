@@ -44,7 +44,14 @@ def _evidence(source: Source, node: ast.SyntaxNode, defined: set[str]) -> ast.Ev
             return ast.Evidence(node.span, "a pair of numbers as an interval", _FIRST)
         case ast.Model():
             return ast.Evidence(node.span, "`model`", _RECENT)
-        case ast.DynamicStatement() | ast.DynamicDefinition() | ast.Take() | ast.Do() | ast.TryInterrupt():
+        case (
+            ast.DynamicStatement()
+            | ast.DynamicDefinition()
+            | ast.Override()
+            | ast.Take()
+            | ast.Do()
+            | ast.TryInterrupt()
+        ):
             return ast.Evidence(node.span, f"`{node.kind}`", _RECENT)
         case ast.Phrase(row=row) if row.construct:
             return ast.Evidence(node.span, row.construct, row.versions)

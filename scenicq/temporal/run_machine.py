@@ -8,8 +8,9 @@ for each choice, and any of them may match.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import accumulate, pairwise
 from typing import assert_never
 
 from scenicq.budget import Exhausted
@@ -17,14 +18,19 @@ from scenicq.errors import Span
 from scenicq.forest.temporal import (
     Arm,
     Atom,
+    Begin,
+    CheckSample,
     Choose,
     Due,
     Dynamics,
     End,
     Formula,
     Goto,
-    Process,
+    IfRuns,
+    Leave,
+    PutBehavior,
     Reject,
+    Stop,
     Terminate,
     Test,
     Wait,
@@ -33,7 +39,7 @@ from scenicq.forest.temporal import (
 )  # fmt: skip
 from scenicq.limits import LIMITS, exhausted
 from scenicq.temporal.literals import Literal, literals_of
-from scenicq.temporal.progression import LOST, Progression, Rest, accepts
+from scenicq.temporal.progression import HOLDS, LOST, Progression, Rest, accepts
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN
 
 __all__ = ["Advance", "RunMachine", "Situation"]
@@ -47,20 +53,37 @@ _REJECTED: _Place = (-2, ())
 """One that has rejected the run."""
 _REJECTS: _Place = (-3, ())
 """A behavior that rejects the run unless it ends with the sample: behaviors say what happens after it."""
+_ASLEEP: _Place = (-4, ())
+"""One of a scenario that does not run, or that overrides nothing now."""
+_LISTED, _LEFT, _ENDED = 1, 2, 3
+"""How a scenario runs: as those that its parent runs, after the parent has left it for others, or no more."""
 _Later = Callable[[float], int]
 """The first place of a sample that is so many seconds later, and at least the next one."""
+_Choices = Mapping[tuple[int, int], int]
+"""Which option each step of a process takes that is a choice."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Mode:
-    """What is left of each requirement, and the step of each process."""
+    """What is left of each requirement, and the step of each process.
+
+    Attributes:
+        rests: What is left of the requirements, those of scenarios behind the others.
+        places: Where processes are.
+        running: Whether each scenario runs, and how.
+        behaving: The objects whose behaviors have been overridden, each with the number of the one that it has now.
+        saved: What the end of a scenario gives back: the scenario, the object, the behavior that it had.
+    """
 
     rests: tuple[Rest, ...]
     places: tuple[_Place, ...]
+    running: tuple[int, ...] = ()
+    behaving: tuple[tuple[int, int], ...] = ()
+    saved: tuple[tuple[int, int, int], ...] = ()
 
     @property
     def matches(self) -> bool:
-        """Whether a run that ends in it is a match."""
+        """Whether a run that ends in it is a match, as far as requirements and processes go."""
         return _REJECTED not in self.places and all(map(accepts, self.rests))
 
     @property
@@ -70,6 +93,36 @@ class _Mode:
 
 
 _Modes = frozenset[_Mode]
+
+
+@dataclass(slots=True)
+class _Sample:
+    """A mode on its way through a sample at which everything is known.
+
+    Attributes:
+        holds: Whether an atom holds.
+        chosen: Which options are taken.
+        here: The place of the sample, where a process has a timer.
+        later: Places of later samples, there.
+        met: Gets what each process does from here on; None where nobody asks.
+    """
+
+    holds: Callable[[int], bool]
+    chosen: _Choices
+    here: int
+    later: _Later | None
+    rests: list[Rest]
+    places: list[_Place]
+    running: list[int]
+    behaving: dict[int, int]
+    saved: dict[tuple[int, int], int]
+    met: list[Span | None] | None = None
+
+    def mode(self) -> _Mode:
+        """The mode that it has come to."""
+        saved = tuple(sorted((*key, process) for key, process in self.saved.items()))
+        behaving = tuple(sorted(self.behaving.items()))
+        return _Mode(tuple(self.rests), tuple(self.places), tuple(self.running), behaving, saved)
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,10 +180,6 @@ class _ToChoose(Exception):
         self.step, self.count = step, count
 
 
-_Choices = Mapping[tuple[int, int], int]
-"""Which option each step of a process takes that is a choice."""
-
-
 @dataclass(eq=False)
 class RunMachine:
     """A program made ready to be followed.
@@ -164,13 +213,23 @@ class RunMachine:
         ends = [each for each in dynamics.terminations if each.condition is not None]
         self._before = [each.condition.number for each in ends if each.condition and not each.simulation]
         self._behind = [each.condition.number for each in ends if each.condition and each.simulation]
-        formulas = [each.formula for each in dynamics.requirements]
+        formulas = [each.formula for each in dynamics.every_requirement]
         self._of_formulas = [frozenset(_atoms(each)) for each in formulas]
-        self._of_processes = [_reads(each) for each in dynamics.processes]
+        counts = [len(each.requirements) for each in dynamics.scenarios]
+        firsts = [len(dynamics.requirements), *(len(dynamics.requirements) + n for n in accumulate(counts))]
+        self._own_rests = [range(*ends) for ends in pairwise(firsts)]
+        self._scenario_of = {
+            process: number for number, each in enumerate(dynamics.scenarios) for process in each.processes
+        }
+        self._overriding = {number for number, each in enumerate(dynamics.processes) if each.overrides}
+        self._of_processes = _reads(dynamics, self._of_formulas, self._own_rests)
         every = {*self._before, *self._behind}.union(*self._of_formulas, *(s for m in self._of_processes for s in m))
         self.atoms = tuple(sorted(every))
         steps = [step for process in dynamics.processes for step in process.steps]
-        self._monitors = [number for number, each in enumerate(dynamics.processes) if each.object is None]
+        self._composing = [number for number, each in enumerate(dynamics.processes) if each.composes]
+        self._monitors = [
+            number for number, each in enumerate(dynamics.processes) if each.object is None and not each.composes
+        ]
         self._behaviors = [number for number, each in enumerate(dynamics.processes) if each.object is not None]
         self._literals = dict(enumerate(literals_of(dynamics.conditions)))
         self.timed = any(isinstance(step, Arm) for step in steps)
@@ -182,7 +241,12 @@ class RunMachine:
         """Forget all situations but the first."""
         for known in (self.situations, self._numbers, self._known, self._ways):
             known.clear()
-        self._situation(frozenset((_Mode(self._rests, ((0, ()),) * len(self.dynamics.processes)),)))
+        dynamics = self.dynamics
+        asleep = self._scenario_of.keys() | self._overriding
+        places = tuple([_ASLEEP if each in asleep else (0, ()) for each in range(len(dynamics.processes))])
+        top = len(dynamics.requirements)
+        rests = (*self._rests[:top], *(HOLDS for _ in self._rests[top:]))
+        self._situation(frozenset((_Mode(rests, places, (0,) * len(dynamics.scenarios)),)))
 
     def advance(
         self, situation: int, values: Mapping[int, int], *, due: bool, here: int = 0, later: _Later | None = None
@@ -233,7 +297,7 @@ class RunMachine:
             return Advance(self._undecided())
         if len(going) > LIMITS.run_modes:
             return Advance(self._undecided())
-        failed = frozenset(each for each in ended if not each.matches)
+        failed = frozenset(each for each in ended if not self._matches(each))
         return Advance(
             self._situation(frozenset(going)) if going else None,
             len(failed) < len(ended),
@@ -285,28 +349,55 @@ class RunMachine:
         later: _Later | None,
     ) -> tuple[_Mode, bool]:  # fmt: skip
         """The mode after a sample at which everything is known, and whether the run is over."""
-        rests = tuple([self._progression.after(rest, holds) for rest in mode.rests])
+        now = self._entered(mode, holds, chosen, here, later)
         if _REJECTS in mode.places:
-            lost = tuple([_REJECTED if place == _REJECTS else place for place in mode.places])
-            return _Mode(rests, lost), due or any(map(holds, self._before))
+            now.places = [_REJECTED if place == _REJECTS else place for place in mode.places]
+            return now.mode(), due or any(map(holds, self._before))
+        over = due
+        for number in () if over else self._composing:
+            over = self._run(number, now) or over
         # these stop the monitors before they run
-        if due or any(map(holds, self._before)):
-            return _Mode(rests, mode.places), True
-        places = list(mode.places)
-        over = False
-        for number in self._monitors:
-            places[number], terminates = self._run(number, places[number], holds, chosen, here, later)
-            over = over or terminates
+        over = over or any(map(holds, self._before))
+        if over or _REJECTED in now.places:
+            return now.mode(), over
+        for number in self._awake(now, self._monitors):
+            over = self._run(number, now) or over
         over = over or any(map(holds, self._behind))
         # behaviors run one after the other, to the first one that ends the run or loses it
         for number in () if over else self._behaviors:
-            before = places[number]
-            places[number], over = self._run(number, before, holds, chosen, here, later)
-            if places[number] == _REJECTED != before:
-                places[number] = _REJECTS
-            if over or places[number] == _REJECTS:
+            before = now.places[number]
+            if before == _ASLEEP or not self._behaves(number, now):
+                continue
+            over = self._run(number, now)
+            if now.places[number] == _REJECTED != before:
+                now.places[number] = _REJECTS
+            if over or now.places[number] == _REJECTS:
                 break
-        return _Mode(rests, tuple(places)), over
+        return now.mode(), over
+
+    def _entered(
+        self, mode: _Mode, holds: Callable[[int], bool], chosen: _Choices, here: int, later: _Later | None,
+        met: list[Span | None] | None = None,
+    ) -> _Sample:  # fmt: skip
+        """A mode at a sample, which the program's own requirements have read."""
+        top = len(self.dynamics.requirements)
+        rests = [self._progression.after(rest, holds) for rest in mode.rests[:top]]
+        saved = {(scenario, index): process for scenario, index, process in mode.saved}
+        return _Sample(
+            holds, chosen, here, later, [*rests, *mode.rests[top:]], list(mode.places), list(mode.running),
+            dict(mode.behaving), saved, met,
+        )  # fmt: skip
+
+    def _awake(self, now: _Sample, monitors: list[int]) -> list[int]:
+        """The monitors whose scenarios run and are not left."""
+        own = self._scenario_of
+        return [each for each in monitors if each not in own or now.running[own[each]] == _LISTED]
+
+    def _behaves(self, number: int, now: _Sample) -> bool:
+        """Whether a behavior is the one that its object has now."""
+        owner = self.dynamics.processes[number].object
+        assert owner is not None
+        return now.behaving.get(owner, number if number not in self._overriding else -1) == number
 
     def activities(
         self, situation: int, values: Mapping[int, int], *, here: int = 0, later: _Later | None = None
@@ -318,62 +409,144 @@ class RunMachine:
         modes = self.situations[situation].modes
         if len(modes) != 1:
             return None
-        met: list[Span | None] = []
+        met: list[Span | None] = [None] * len(self.dynamics.processes)
         try:
-            for number, place in enumerate(next(iter(modes)).places):
-                met.append(None)
-                self._run(number, place, self._holding(values, {}), {}, here, later, met)
+            now = self._entered(next(iter(modes)), self._holding(values, {}), {}, here, later, met)
+            for number in (*self._composing, *self._awake(now, self._monitors)):
+                self._run(number, now)
+            for number in self._behaviors:
+                if self._behaves(number, now):
+                    self._run(number, now)
         except (_NotObserved, _ToChoose):
             return None
         return tuple(met)
 
-    def _run(
-        self, number: int, place: _Place, holds: Callable[[int], bool], chosen: _Choices, here: int,
-        later: _Later | None, met: list[Span | None] | None = None,
-    ) -> tuple[_Place, bool]:  # fmt: skip
-        """Where a process goes on after a sample, and whether it ends the run; what it does last of what is met."""
+    def _run(self, number: int, now: _Sample) -> bool:
+        """Lead a process through a sample; whether it ends the run."""
         steps = self.dynamics.processes[number].steps
-        at, timers = place[0], dict(place[1])
+        at, timers = now.places[number][0], dict(now.places[number][1])
         # who goes through more steps than there are never gets to the next sample
         for _ in range(len(steps) + 1 if at >= 0 else 0):
             step = steps[at]
             match step:
                 case Test():
-                    at = step.then if holds(step.condition.number) else step.otherwise
+                    at = step.then if now.holds(step.condition.number) else step.otherwise
                 case Goto():
                     at = step.then
                 case Arm():
-                    due = here + 1 if later is None else later(step.after_s)
+                    due = now.here + 1 if now.later is None else now.later(step.after_s)
                     timers[step.timer] = max(due, timers.get(step.timer, 0)) if step.extends else due
                     at = step.then
                 case Due():
-                    at = step.then if timers[step.timer] <= here else step.otherwise
+                    at = step.then if timers[step.timer] <= now.here else step.otherwise
                 case Choose():
-                    if (number, at) not in chosen:
+                    if (number, at) not in now.chosen:
                         raise _ToChoose((number, at), len(step.options))
-                    at = step.options[chosen[number, at]]
+                    at = step.options[now.chosen[number, at]]
+                case IfRuns():
+                    at = step.then if now.running[step.scenario] in (_LISTED, _LEFT) else step.otherwise
+                case Begin() | CheckSample() | Stop() | Leave() | PutBehavior():
+                    self._directed(step, now)
+                    at = step.then
                 case Wait():
-                    if met is not None:
-                        met[-1] = step.activity
+                    if now.met is not None:
+                        now.met[number] = step.activity
                     # of a timer whose time is over nothing but that is known any more
                     running = [(timer, timers[timer]) for timer in step.timers if timer in timers]
-                    return (step.then, tuple([(timer, at if at > here else 0) for timer, at in running])), False
+                    now.places[number] = step.then, tuple([(key, at if at > now.here else 0) for key, at in running])
+                    return False
                 case Terminate():
-                    return _OVER, True
+                    now.places[number] = _OVER
+                    return True
                 case Reject():
-                    return _REJECTED, False
+                    now.places[number] = _REJECTED
+                    return False
                 case End():
-                    return _OVER, False
+                    now.places[number] = _OVER
+                    return False
                 case _:
                     assert_never(step)
-        return place if at < 0 else _REJECTED, False
+        if at >= 0:
+            now.places[number] = _REJECTED
+        return False
+
+    # --- scenarios within the program
+
+    def _directed(self, step: Begin | CheckSample | Stop | Leave | PutBehavior, now: _Sample) -> None:
+        """Begin, go on with or end scenarios, or what they override."""
+        match step:
+            case Begin():
+                scenario = step.scenario
+                self._close(scenario, now)
+                now.saved = {key: each for key, each in now.saved.items() if key[0] != scenario}
+                for number in self._own_rests[scenario]:
+                    if now.rests[number] != LOST:
+                        now.rests[number] = self._rests[number]
+                for number in self.dynamics.scenarios[scenario].processes:
+                    _awaken(number, now)
+                now.running[scenario] = _LISTED
+            case CheckSample():
+                for number in self._own_rests[step.scenario]:
+                    now.rests[number] = self._progression.after(now.rests[number], now.holds)
+            case Stop():
+                self._stop(step.scenario, now)
+            case Leave():
+                for number, each in enumerate(self.dynamics.scenarios):
+                    if each.parent == step.scenario and now.running[number] == _LISTED:
+                        # no sample is read any more by what it requires
+                        self._close(number, now)
+                        now.running[number] = _LEFT
+            case PutBehavior():
+                before = now.behaving.get(step.object, self._first_behavior(step.object))
+                now.saved.setdefault((step.scenario, step.object), before)
+                self._behave(step.object, step.process, now)
+                if step.process >= 0:
+                    _awaken(step.process, now)
+
+    def _first_behavior(self, owner: int) -> int:
+        """The behavior that an object has unless it is overridden; -1 for none."""
+        own = [each for each in self._behaviors if self.dynamics.processes[each].object == owner]
+        return next((each for each in own if each not in self._overriding), -1)
+
+    def _behave(self, owner: int, process: int, now: _Sample) -> None:
+        """An object behaves in another way; what must be shown of the way before has time again when that goes on."""
+        before = now.behaving.get(owner, self._first_behavior(owner))
+        if before >= 0 and before != process:
+            at, timers = now.places[before]
+            now.places[before] = self.dynamics.processes[before].afresh.get(at, at), timers
+        now.behaving[owner] = process
+
+    def _stop(self, scenario: int, now: _Sample) -> None:
+        """End a scenario if it runs, those that it runs first."""
+        order: list[int] = []
+        stack = [scenario] if now.running[scenario] in (_LISTED, _LEFT) else []
+        while stack:
+            order.append(stack.pop())
+            stack += [
+                number for number, each in enumerate(self.dynamics.scenarios)
+                if each.parent == order[-1] and now.running[number] == _LISTED
+            ]  # fmt: skip
+        for each in reversed(order):
+            for key in [key for key in now.saved if key[0] == each]:
+                self._behave(key[1], now.saved.pop(key), now)
+            self._close(each, now)
+            now.running[each] = _ENDED
+
+    def _close(self, scenario: int, now: _Sample) -> None:
+        """What a scenario requires must hold by now, and says nothing any more."""
+        for number in self._own_rests[scenario]:
+            now.rests[number] = HOLDS if accepts(now.rests[number]) else LOST
+
+    def _matches(self, mode: _Mode) -> bool:
+        """Whether a run that ends in a mode is a match."""
+        return mode.matches and all(mode.running[each] for each in self.dynamics.needs)
 
     def _situation(self, modes: _Modes) -> int:
         if modes not in self._numbers:
             if self.situations and len(self.situations) >= LIMITS.run_situations:
                 return self._undecided()
             self._numbers[modes] = len(self.situations)
-            matching = [mode.matches for mode in modes]
+            matching = [self._matches(mode) for mode in modes]
             truth = int(TRUE if all(matching) else UNKNOWN if any(matching) else FALSE)
             lost = all(mode.is_lost for mode in modes)
             reads = tuple(sorted({atom for mode in modes for atom in self._reads(mode)}))
@@ -409,7 +582,7 @@ class RunMachine:
         number = min(common or {min(each) for each in ways if each} or {-1})
         if number < 0:
             return None
-        said = [*self.dynamics.requirements, *self.dynamics.processes]
+        said = [*self.dynamics.every_requirement, *self.dynamics.processes]
         return said[number].span
 
     def _causes(self, mode: _Mode, *, for_good: bool) -> list[int]:
@@ -418,21 +591,46 @@ class RunMachine:
         return found + [len(mode.rests) + n for n, place in enumerate(mode.places) if place in rejecting]
 
 
-def _reads(process: Process) -> list[frozenset[int]]:
-    """The numbers of the atoms that a process may read at one sample, by the step at which it goes on."""
-    found: list[frozenset[int]] = []
-    for first in range(len(process.steps)):
-        seen, stack = {first}, [first]
-        atoms: set[int] = set()
-        while stack:
-            step = process.steps[stack.pop()]
-            if isinstance(step, Test):
-                atoms.add(step.condition.number)
-            after = successors(step)
-            new = [each for each in after if each not in seen]
-            seen.update(new)
-            stack += new
-        found.append(frozenset(atoms))
+def _awaken(process: int, now: _Sample) -> None:
+    """Begin a process, unless it has rejected the run."""
+    if now.places[process] not in (_REJECTED, _REJECTS):
+        now.places[process] = (0, ())
+
+
+def _reads(
+    dynamics: Dynamics, of_formulas: Sequence[frozenset[int]], own_rests: Sequence[range]
+) -> list[list[frozenset[int]]]:
+    """For each process the numbers of the atoms that may be read at one sample, by the step at which it goes on."""
+    # what else is read where a process comes to a step: by whole processes that begin with it, and by formulas
+    found: list[list[frozenset[int]]] = []
+    for own, process in enumerate(dynamics.processes):
+        mine: list[frozenset[int]] = []
+        for first in range(len(process.steps)):
+            atoms: set[int] = set()
+            seen = {(own, first), (own, process.afresh.get(first, first))}
+            stack = list(seen)
+            while stack:
+                number, at = stack.pop()
+                step = dynamics.processes[number].steps[at]
+                after = [(number, each) for each in successors(step)]
+                match step:
+                    case Test():
+                        atoms.add(step.condition.number)
+                    case Begin() | CheckSample():
+                        atoms.update(*(of_formulas[each] for each in own_rests[step.scenario]))
+                    case _:
+                        pass
+                begun: tuple[int, ...] = ()
+                if isinstance(step, Begin):
+                    begun = dynamics.scenarios[step.scenario].processes
+                elif isinstance(step, PutBehavior):
+                    begun = (step.process,) if step.process >= 0 else ()
+                after += [(each, 0) for each in begun]
+                new = [each for each in after if each not in seen]
+                seen.update(new)
+                stack += new
+            mine.append(frozenset(atoms))
+        found.append(mine)
     return found
 
 

@@ -24,7 +24,10 @@ def scene_of(scenario: Scenario, seed: int) -> Scene:
 
 LANES = [0, 9, 14]
 """Numbers of lanes that differ in all that is asked."""
-LINES = ("start.position.x", "end.heading", "points[1].x", "length", "pointAlongBy(7).y", "pointAlongBy(0.25, True).x")
+LINES = (
+    "start.position.x", "end.heading", "points[1].x", "length", "pointAlongBy(7).y", "pointAlongBy(0.25, True).x",
+    "project((3, 20)).y",
+)  # fmt: skip
 REGIONS = (
     "distanceTo((70, -33))", "containsPoint((1.75, 20))", "containsObject(ego)", "intersects(network.roads[0])",
     "union(circular_region)", "intersect(circular_region)", "difference(circular_region)",
@@ -80,6 +83,21 @@ def test_a_point_at_a_random_distance_is_where_shapely_puts_it(distance: str, fa
         params = scene_of(scenario, seed).params
         point = shapely.LineString(BENT).interpolate(params["far"] * factor)  # type: ignore[operator]
         assert (params["x"], params["y"]) == pytest.approx((point.x, point.y))
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_point_is_projected_where_shapely_puts_it(seed: int) -> None:
+    scenario = compiled(
+        f"{MODEL}path = PolylineRegion({BENT})\np = new Point at (Range(-5, 20), Range(-5, 20))\n"
+        "near = path.project(p)\nparam px = p.position.x, py = p.position.y, x = near.x, y = near.y\n"
+    )
+    params = scene_of(scenario, seed).params
+    line = shapely.LineString(BENT)
+    point = line.interpolate(line.project(shapely.Point(params["px"], params["py"])))
+    assert (params["x"], params["y"]) == pytest.approx((point.x, point.y))
+    known = drawn(f"{MODEL}near = PolylineRegion({BENT}).project(({params['px']}, {params['py']}))\n"
+                  "param x = near.x, y = near.y\n")[1].params  # fmt: skip
+    assert (known["x"], known["y"]) == pytest.approx((point.x, point.y))
 
 
 SAME = {"a is b": True, "a == b": True, "a is not b": False, "a != b": False, "not (b == a)": False, "b is a": True}

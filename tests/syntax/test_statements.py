@@ -49,7 +49,7 @@ STATEMENTS = {
     "terminate when x as y": "DynamicStatement(terminate when, x)",
     "abort": "DynamicStatement(abort)",
     "invoke A()": "Do([A()])",
-    "override ego with behavior B(),\n  with x 1": "DynamicStatement(override)",
+    "override ego with behavior B(),\n  with x 1": "Override(ego, [With(behavior, B()), With(x, 1)])",
     "try:\n  do A()\ninterrupt when x:\n  do B()\nexcept E:\n  abort": "TryInterrupt([Do([A()])], "
     "[Interrupt(x, [Do([B()])])], [ExceptHandler(E, [DynamicStatement(abort)])])",
 }

@@ -10,13 +10,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from compiled_processes import compiled, numbers_of
 
-from scenicq.compiler.program import compile_scenario
-from scenicq.errors import ScenarioError, Source
-from scenicq.forest.nodes import Compare, Constant
-from scenicq.forest.temporal import Dynamics
-from scenicq.forest.walk import postorder
-from scenicq.geometry.default_street import street
 from scenicq.temporal.run_lanes import follow_runs
 from scenicq.temporal.run_machine import RunMachine
 from scenicq.temporal.stretches import Timeline
@@ -407,26 +402,6 @@ def completions(rows: list[list[int]]) -> Iterator[list[list[bool]]]:
         for (k, a), value in zip(gaps, values, strict=True):
             whole[k][a] = value
         yield whole
-
-
-def compiled(text: str) -> Dynamics | None:
-    """The program; None for one that may be in too many states."""
-    try:
-        return compile_scenario(Source("b.scenic", text), street(), version=3, behaviors="guards").dynamics
-    except ScenarioError as error:
-        if error.diagnostics[0].code != "budget-exceeded":
-            raise
-        return None
-
-
-def numbers_of(dynamics: Dynamics) -> dict[int, int]:
-    """The number of the condition that each atom is."""
-    found: dict[int, int] = {}
-    for number, condition in enumerate(dynamics.conditions):
-        (compare,) = (node for node in postorder((condition,)) if isinstance(node, Compare))
-        sides = (compare.left, compare.right)
-        found[number] = next(int(side.value) for side in sides if isinstance(side, Constant)) - 1
-    return found
 
 
 @pytest.mark.parametrize("seed", range(150))

@@ -20,4 +20,5 @@ def ready(scenario: Scenario) -> Scenario:
     """
     if scenario.as_written is not None:
         return scenario
-    return replace(simplify(choose_elements(choose_steps(scenario))), as_written=scenario)
+    made = simplify(choose_elements(choose_steps(scenario)))
+    return replace(made, as_written=scenario, variants=tuple(map(ready, scenario.variants)))

@@ -251,6 +251,9 @@ class _Forms(ValueNumbers):
     def over_time(self, dynamics: Dynamics, swap: Mapping[int, int]) -> Hashable:
         """All that is said about time, with some objects put for others."""
         atoms = [self.expression(condition, swap) for condition in dynamics.conditions]
+        if dynamics.scenarios:
+            # scenarios that run one after the other tell their objects apart
+            return tuple(atoms), tuple(sorted(swap.items()))
         said: Counter[Hashable] = Counter()
         for requirement in dynamics.requirements:
             said["require", self._formula(requirement.formula, atoms)] += 1

@@ -37,6 +37,7 @@ if TYPE_CHECKING:  # they take long to load, and not every query needs the last 
     from scenicq.query.execution.own_lanes import OwnLanes
     from scenicq.query.execution.recorder import Recorder
     from scenicq.query.execution.recording_matcher import DecidedRecordings, RecordingMatcher
+    from scenicq.query.execution.variant_matcher import VariantMatcher
 
 _FIRST_BATCH, _BATCH = 16, 2048
 """Labels whose places are looked up together: few until it is known what matters."""
@@ -76,8 +77,11 @@ class CompiledMap:
         if prefilter:
             plan = make_plan(scenario, network, options, deciding=not proofs, counting=reasons)
         asked = properties_of_others(scenario)
-        observed = frozenset[str](asked or ()).union(*relevant_properties(scenario, options))
-        return cls(scenario, network, plan, not MOTION.isdisjoint(observed), observed, asked is not None)
+        every = (scenario, *scenario.variants)
+        relevant = [names for each in every for names in relevant_properties(each, options)]
+        observed = frozenset[str](asked or ()).union(*relevant)
+        whole = asked is not None or bool(scenario.variants)
+        return cls(scenario, network, plan, not MOTION.isdisjoint(observed), observed, whole)
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,7 +134,9 @@ class Decider:
     _own_lanes: dict[str, OwnLanes | None] = field(default_factory=dict["str", "OwnLanes | None"])
     _compiled: dict[str, CompiledMap] = field(default_factory=dict["str", CompiledMap])
     _matchers: dict[str, Matcher] = field(default_factory=dict["str", "Matcher"])
-    _over_time: dict[str, RecordingMatcher] = field(default_factory=dict["str", "RecordingMatcher"])
+    _over_time: dict[str, RecordingMatcher | VariantMatcher] = field(
+        default_factory=dict["str", "RecordingMatcher | VariantMatcher"]
+    )
     _open: ExitStack = field(default_factory=ExitStack)
     _connection: duckdb.DuckDBPyConnection | None = None
     _solver: LazySolver | None = None
@@ -304,18 +310,25 @@ class Decider:
         missed = np.where(left, -1, 0).astype(np.int16)
         return missed, {name: each[left[place]] for name, each in found.items()}
 
-    def _recording_matcher(self, compiled: CompiledMap) -> RecordingMatcher:
+    def _recording_matcher(self, compiled: CompiledMap) -> RecordingMatcher | VariantMatcher:
         name = compiled.network.name
         if name not in self._over_time:
             # take long to load
+            from scenicq.match.matcher import Matcher  # noqa: PLC0415
             from scenicq.query.execution.recording_matcher import RecordingMatcher  # noqa: PLC0415
+            from scenicq.query.execution.variant_matcher import VariantMatcher  # noqa: PLC0415
             from scenicq.temporal.intervals import IntervalMatcher  # noqa: PLC0415
 
-            intervals = IntervalMatcher(compiled.scenario, self.options, self.time, self._solver, self.reasons)
-            matcher = self._matcher(compiled)
-            self._over_time[name] = RecordingMatcher(
-                self.dataset, matcher, intervals, self.every, self.proofs, self.reasons
-            )
+            def made(scenario: Scenario, matcher: Matcher) -> RecordingMatcher:
+                intervals = IntervalMatcher(scenario, self.options, self.time, self._solver, self.reasons)
+                return RecordingMatcher(self.dataset, matcher, intervals, self.every, self.proofs, self.reasons)
+
+            variants = compiled.scenario.variants
+            if variants:
+                each = [made(one, Matcher(one, self.options, self._solver)) for one in variants]
+                self._over_time[name] = VariantMatcher(each)
+            else:
+                self._over_time[name] = made(compiled.scenario, self._matcher(compiled))
         return self._over_time[name]
 
     def _matcher(self, compiled: CompiledMap) -> Matcher:

@@ -13,7 +13,17 @@ from scenicq.errors import DataError, Diagnostic, SolverError
 from scenicq.forest.scenario import BuiltIn
 from scenicq.match.options import MatchOptions, Method
 from scenicq.match.tolerance import parse_tolerance
-from scenicq.option_values import FURTHEST_M, Amount, Count, Flag, OneOf, OptionKind, Text, read_options_of
+from scenicq.option_values import (
+    FURTHEST_M,
+    Amount,
+    Count,
+    Flag,
+    OneOf,
+    OptionKind,
+    Parameters,
+    Text,
+    read_options_of,
+)
 from scenicq.query.execution.run import QueryOptions
 from scenicq.store.classes import Granularity
 from scenicq.temporal.interval_options import DEFAULT_GAP_S, IntervalOptions, Intervals
@@ -64,6 +74,8 @@ class OptionTexts(TypedDict, total=False):
     intervals: Intervals
     gap: float | str
     model: str | None
+    run_scenario: str | None
+    params: Mapping[str, float | str] | None
 
 
 _SOLVERS = ("auto", "dreal", "portable")
@@ -98,11 +110,13 @@ KINDS: Mapping[str, OptionKind] = {
     "intervals": OneOf(get_args(Intervals)),
     "gap": Amount("s", above=True),
     "model": Text("the name of a world model"),
+    "run_scenario": Text("the name of a scenario"),
+    "params": Parameters(),
 }
 """What values the options have, by the names of the command line, for the command and for Python."""
 _OPTIONAL = frozenset({
     "tolerance", "radius", "enforce", "jobs", "limit", "where", "sort", "scenic", "ignore_params", "min_duration",
-    "model",
+    "model", "run_scenario", "params",
 })  # fmt: skip
 
 
@@ -173,11 +187,11 @@ def read_options(**given: Unpack[OptionTexts]) -> QueryOptions:
     time = IntervalOptions(read.get("intervals", "longest"), read.get("min_duration"), read.get("gap", DEFAULT_GAP_S))
     same = (
         "solver", "initial", "map_defaults", "lanes", "prefilter", "jobs", "limit", "where", "sort", "every",
-        "all_matches", "strict", "model",
+        "all_matches", "strict", "model", "run_scenario",
     )  # fmt: skip
     values: dict[str, Any] = {name: value for name, value in read.items() if name in same}
     version = None if scenic is None else VERSIONS[scenic]
     return QueryOptions(
         match=options, version=version, behaviors=read.get("behaviors", "motion"),
-        reaction_s=read.get("reaction", REACTION_S), time=time, **values,
+        reaction_s=read.get("reaction", REACTION_S), time=time, params=read.get("params") or (), **values,
     )  # fmt: skip

@@ -74,6 +74,8 @@ class QueryOptions:
         reaction_s: Seconds that an object has to do what its behavior says, at each change.
         time: Options of intervals.
         model: The world model of a program that imports none.
+        run_scenario: Which scenario of the program runs, by its name.
+        params: Values of global parameters, whatever the program says.
         strict: Whether what the program sets and no label has is an error.
         proofs: Whether somebody reads how frames match; if not, a match that SQL decides names nobody and nothing.
         reasons: Whether somebody reads what frames fail at first; if not, the funnel does not say it of those that the
@@ -100,6 +102,8 @@ class QueryOptions:
     reaction_s: float = REACTION_S
     time: IntervalOptions = field(default_factory=IntervalOptions)
     model: str | None = None
+    run_scenario: str | None = None
+    params: tuple[tuple[str, float | str], ...] = ()
     strict: bool = False
     proofs: bool = True
     reasons: bool = True
@@ -171,7 +175,7 @@ class Query:
                 self.source, network, version=self.options.version, initial=self.options.initial,
                 behaviors=self.options.behaviors, reaction_s=self.options.reaction_s, loader=self.siblings,
                 model=self.options.model, map_defaults=self.options.map_defaults, gap_s=self.options.time.gap_s,
-                lanes=self.options.lanes,
+                lanes=self.options.lanes, scenario=self.options.run_scenario, params=dict(self.options.params),
             )  # fmt: skip
             check_enforced(scenario, self.options.match.enforce)
         except ScenarioError as error:

@@ -77,6 +77,11 @@ class IntervalExplanation:
         return bool(self.undecided) or (self.interval is not None and self.interval.truth != FALSE)
 
     @property
+    def samples(self) -> int:
+        """How many samples the interval has."""
+        return 0 if self.interval is None else self.interval.end - self.interval.start + 1
+
+    @property
     def matches(self) -> bool:
         """Whether it matches."""
         return self.interval is not None and self.interval.truth == TRUE
@@ -178,9 +183,22 @@ def explain_recording(query: Query, solver: Solver, name: str, begins: int | flo
     """
     part, first, end = locate(query.dataset, name)
     labels: list[Label] = list(query.dataset.labels_at(part, first, end))
+    scenario, _ = query.compile(labels[0].map)
+    found = [
+        _explain_variant(query, solver, each, name, begins, labels)
+        for each in scenario.variants or (scenario,)
+    ]  # fmt: skip
+    # the surest, then what came furthest
+    return max(found, key=lambda each: (each.matches, each.is_unknown, each.samples))
+
+
+def _explain_variant(
+    query: Query, solver: Solver, scenario: Scenario, name: str, begins: int | float | None, labels: Sequence[Label]
+) -> IntervalExplanation:
+    """Explain a recording by one variant of a program; arguments as of `explain_recording`."""
+    part, first, end = locate(query.dataset, name)
     with TrackReader(query.dataset, part) as reader:
         tracks = reader.read(first, end)
-    scenario, _ = query.compile(labels[0].map)
     intervals = IntervalMatcher(scenario, query.options.match, query.options.time, solver)
     matchers = start_matchers(Matcher(scenario, query.options.match, solver), intervals.outcomes)
     # an interval of a program about one instant is made of frames that all match
@@ -230,9 +248,9 @@ def explain_recording(query: Query, solver: Solver, name: str, begins: int | flo
         return IntervalExplanation(tracks, None, failed=failed, example=example, undecided=undecided)
     best = max(results, key=lambda each: (each.truth, each.cut_off, each.end - each.start))
     roles = tuple((scenario.objects[index].name, track[1] or "ego") for index, track in best.binding)
-    shifts = [
-        shift_comparison(each, best.broken) for each in changes_of(scenario, tracks, best)[: LIMITS.ranked_numbers]
-    ]
+    # one of several variants is not tried again by itself
+    tried = () if query.compiled_map(labels[0].map).scenario.variants else changes_of(scenario, tracks, best)
+    shifts = [shift_comparison(each, best.broken) for each in tried[: LIMITS.ranked_numbers]]
     changes = tuple(each.text for each in shifts if longest_with(query, name, labels[0].map, each) is not None)
     over = conditions_over(scenario, tracks, best)
     bands = bands_of(scenario, over)
