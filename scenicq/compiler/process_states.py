@@ -11,7 +11,7 @@ from scenicq.compiler.local_values import Held
 from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.forest.nodes import Node
-from scenicq.forest.temporal import Begin, CheckSample, End, Leave, PutBehavior, Reject, Stop, Terminate
+from scenicq.forest.temporal import Begin, CheckSample, End, GiveUp, Leave, PutBehavior, Reject, Stop, Terminate
 from scenicq.limits import LIMITS
 from scenicq.syntax import ast
 
@@ -271,7 +271,8 @@ class Asked:
 GraphGuards: TypeAlias = tuple[tuple[Node, Span], ...]
 ScenarioStep: TypeAlias = Begin | CheckSample | Stop | Leave | PutBehavior
 Following: TypeAlias = (
-    "ProcessState | Asked | Ways | OnTimer | TimerStarts | Waits | Terminate | Reject | End | Directs | OnRunning"
+    "ProcessState | Asked | Ways | OnTimer | TimerStarts | Waits | Terminate | Reject | End | GiveUp | Directs"
+    " | OnRunning"
 )
 
 
