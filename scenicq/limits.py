@@ -304,6 +304,7 @@ class Limits:
     arrival_combinations: int = _undecided(
         200_000, "combinations", "of starts with tracks for objects that come later, in one block", "budget"
     )
+    mode_ways: int = _shorter(2_000, "steps", "of the ways from one mode to others that are shown")
     arrival_questions: int = _undecided(
         2_000, "labels", "at which objects may come, in one process, that arrays do not decide", "budget"
     )

@@ -587,11 +587,14 @@ class CompositionGraph(ProcessGraph):
                 following = on(at=frame.at + 1)
                 return following if scenario.is_silent else OnRunning(running.number, following, without)
             case "begins":
-                inside = on(stage="ends" if running.frames is None else "inside")
+                known = (*frame.scenarios[: frame.at], replace(running, is_new=False), *frame.scenarios[frame.at + 1 :])
+                inside = on(stage="ends" if running.frames is None else "inside", scenarios=known)
                 if running.frames is not None:
                     inside = replace(inside, frames=(*inside.frames, *running.frames),
                                      resumed=len(inside.frames) if running.resumes else -1, asked=-1)  # fmt: skip
-                found: Following = inside if running.timer < 0 else OnTimer(running.timer, over, inside)
+                found: Following = (
+                    inside if running.timer < 0 or running.is_new else OnTimer(running.timer, over, inside)
+                )
                 if scenario.after_s == 0:
                     found = over
                 return Directs(CheckSample(running.number, 0), found) if scenario.requirements else found

@@ -194,12 +194,14 @@ class RunningScenario:
         timer: The number of the timer that ends it; -1 for none.
         frames: Those of what it composes, the outermost first; None where it composes nothing.
         resumes: Whether they go on after a sample.
+        is_new: Whether it has begun with this sample: then its time is not over.
     """
 
     number: int
     timer: int
     frames: tuple[ProcessFrame, ...] | None
     resumes: bool = False
+    is_new: bool = True
 
 
 @dataclass(frozen=True, slots=True)
