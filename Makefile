@@ -13,7 +13,7 @@ FASTEST := tests/syntax tests/forest tests/compiler tests/test_language.py tests
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo lint check test test-all test-oldest test-newest golden bench bench-scale conformance conformance-random conformance-time fuzz oracle-frames oracle-time mutate browser dreal clean
+.PHONY: help setup demo lint docs check test test-all test-versions test-oldest test-newest golden bench bench-scale conformance conformance-random conformance-time fuzz oracle-frames oracle-time mutate browser dreal clean
 
 help: ## List the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | while IFS="$$(printf '\t')" read -r name text; do \
@@ -38,6 +38,9 @@ lint: $(READY) ## Format, lint, types and layers
 	$(BIN)/pyright --warnings
 	$(BIN)/lint-imports --no-cache
 
+docs: $(READY) ## Make the documentation site in build/docs; a link that leads nowhere is an error
+	$(BIN)/sphinx-build -q -W --keep-going -c scenicq/docs -d build/doctrees . build/docs
+
 check: lint ## What lint does, and the fastest tests: under two minutes
 	$(PYTEST) -n $(WORKERS) -m 'not slow' $(FASTEST)
 
@@ -49,6 +52,9 @@ test-all: $(READY) ## All tests
 	$(PYTEST) -n $(WORKERS) --hypothesis-profile=anew
 	$(BIN)/python tests/dependencies/versions.py oldest
 	$(BIN)/python tests/dependencies/versions.py newest --pre
+
+test-versions: $(READY) ## What test-oldest and test-newest do, side by side
+	$(BIN)/python tests/dependencies/versions.py oldest newest
 
 test-oldest: $(READY) ## The lowest versions of dependencies that pyproject.toml allows, without pandas: the same output
 	$(BIN)/python tests/dependencies/versions.py oldest

@@ -1,4 +1,4 @@
-"""What helps where nothing, or hardly anything, matches: a few lines on standard error."""
+"""Advice where nothing, or hardly anything, matches: a few lines on standard error."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def advise(query: Query, *, asked: bool, near: bool = False) -> None:
 
 
 def _place(change: Change) -> str:
-    """The lines that a change concerns, and what to write there."""
+    """Where a change applies in the program, and what to write there."""
     told: list[str] = []
     for each in change.parts:
         span = each.span

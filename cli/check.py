@@ -110,7 +110,7 @@ def _groups(scenario: Scenario) -> list[str]:
 
 @dataclass(frozen=True, slots=True)
 class _Asked:
-    """What a check looks at beside the program.
+    """What a check takes into account besides the program.
 
     Attributes:
         options: Classes and ego.
@@ -136,7 +136,7 @@ class _Asked:
 def _found(
     source: Source, networks: Iterator[Network], version: int | None, initial: bool, details: Details, asked: _Asked
 ) -> tuple[list[str], list[Diagnostic]]:
-    """A line for each map that the scenario fits, and every diagnostic once.
+    """Check the program on each map: a line for each that the scenario fits, and every diagnostic once.
 
     A map that lacks what the scenario needs is no error where another map has it.
     """

@@ -1,4 +1,4 @@
-"""Which options of `scenicq match` go together: one table of what needs what, and of what excludes what."""
+"""Which options of `scenicq match` can be combined: one table of what needs what, and of what excludes what."""
 
 from __future__ import annotations
 
@@ -30,17 +30,17 @@ _EXCLUDES = {
     ("shard", "sort"): "",
     ("rank", "sort"): "",
 }
-"""Two options that cannot be had together, and what to do instead."""
+"""Two options that cannot be combined, and what to do instead."""
 
 _FRAMES_ONLY = ("advise",)
 """Options that mean nothing where intervals are looked for."""
 
 
 def check_combination(ctx: click.Context, given: Mapping[str, object]) -> None:
-    """Refuse options that do not go together.
+    """Refuse options that cannot be combined.
 
     Args:
-        ctx: Of the command.
+        ctx: The command's context.
         given: The value of each option by its name; what is None or false is not given.
 
     Raises:
@@ -51,15 +51,15 @@ def check_combination(ctx: click.Context, given: Mapping[str, object]) -> None:
             raise click.UsageError(message, ctx)
     for (option, other), instead in _EXCLUDES.items():
         if given.get(option) and given.get(other):
-            raise click.UsageError(f"--{option} cannot be had with --{other}{instead}", ctx)
+            raise click.UsageError(f"--{option} cannot be combined with --{other}{instead}", ctx)
 
 
 def check_over_time(ctx: click.Context, given: Mapping[str, object], is_over_time: Callable[[], bool]) -> None:
     """Refuse options that are about frames where intervals are looked for.
 
     Args:
-        ctx: Of the command.
-        given: As of `check_combination`.
+        ctx: The command's context.
+        given: As `check_combination` has it.
         is_over_time: Whether intervals are looked for; asked where it matters.
 
     Raises:
@@ -67,4 +67,4 @@ def check_over_time(ctx: click.Context, given: Mapping[str, object], is_over_tim
     """
     for option in _FRAMES_ONLY:
         if given.get(option) and is_over_time():
-            raise click.UsageError(f"--{option} is about frames: it cannot be had with intervals", ctx)
+            raise click.UsageError(f"--{option} is about frames: it cannot be combined with intervals", ctx)

@@ -1,4 +1,4 @@
-"""Datasets as commands open them: one of somebody else is looked at before anything is done with it, and once."""
+"""Open datasets for commands: one that somebody else made is checked once, before anything is done with it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a query has found goes where it is wanted: as results, as an export and as a report."""
+"""Deliver what a query finds: as results, as an export and as a report."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class Wanted:
 def deliver(
     query: Query, results: Generator[Result], near: Iterable[Result], wanted: Wanted, bar: ProgressBar
 ) -> ResultSummary:
-    """Take results, and then those that come close, and hand them on.
+    """Write the results of a query, then the near misses, wherever they are wanted.
 
     Returns:
         What the results say of themselves.
@@ -144,7 +144,7 @@ def _deliver(
 
 
 def _kept(results: Iterable[Result], into: list[Result] | None) -> Iterator[Result]:
-    """The results, kept for a report if there is to be one."""
+    """Pass results on, and keep them if there is to be a report."""
     for result in results:
         if into is not None:
             into.append(result)
@@ -152,7 +152,7 @@ def _kept(results: Iterable[Result], into: list[Result] | None) -> Iterator[Resu
 
 
 def exit_code(funnel: Funnel, summary: ResultSummary | None) -> int:
-    """The exit code of a query: whether something matched, where all that was to be decided is.
+    """Choose the exit code of a query: 0 for matches, 1 for none, 3 where something is undecided.
 
     Args:
         funnel: Its counts.

@@ -17,10 +17,20 @@ from scenicq.errors import DataError, Diagnostic, plain_json
 from scenicq.evaluate.clusters import CLUSTER_KEYS
 from scenicq.evaluate.comparison import MARGIN
 from scenicq.evaluate.detection import DISTANCES, Missing
-from scenicq.evaluate.evaluation import Evaluation, Results
-from scenicq.evaluate.evaluation import evaluate as judge
+from scenicq.evaluate.evaluation import Evaluation, ModelsEvaluation, Results, name_models
+from scenicq.evaluate.evaluation import evaluate_models as judge
 from scenicq.evaluate.pages import write_pages
-from scenicq.evaluate.rows import COLUMNS, evaluation_record, flat_rows, frame_counts, overview, tables
+from scenicq.evaluate.rows import (
+    COLUMNS,
+    Table,
+    evaluation_record,
+    frame_counts,
+    models_record,
+    models_rows,
+    models_table,
+    overview,
+    tables,
+)
 from scenicq.option_values import MARGIN_OPTION, SCORE, SEED
 from scenicq.query.execution.option_texts import read_options
 from scenicq.query.execution.run import Query
@@ -66,9 +76,10 @@ _EXTENSIONS = {".json": "json"}
 )
 @click.argument("results", metavar="RESULTS...", type=ANY_PATH, nargs=-1, required=True)
 @click.argument("dataset", type=click.Path())
-@click.option("--predictions", metavar="FILE", type=LOCAL_PATH, required=True,
+@click.option("--predictions", metavar="FILE", type=LOCAL_PATH, multiple=True, required=True,
               help="Detections of a model: nuScenes results (.json), Argoverse 2 (.feather), or labels of the "
-              "interchange format whose objects have a `score` (.jsonl or .parquet).")
+              "interchange format whose objects have a `score` (.jsonl or .parquet). Given several times, each model "
+              "is also compared with those before it, on the same objects.")
 @click.option("--distance", metavar="M[,CLASS=M]", type=OptionType(DISTANCES), default="2",
               help="Centre distance within which an object counts as found: 0.5, 1, 2 or 4 metres; for some classes "
               "another one: 2,pedestrian=0.5.")
@@ -78,7 +89,8 @@ _EXTENSIONS = {".json": "json"}
               help="What a frame without detections is: an error, a frame in which nothing was found, or left out.")
 @click.option("--simulated", metavar="FILE", type=LOCAL_PATH,
               help="Simulated runs to set beside it: CSV with `scenario` (the name of a results file) and `failed` or "
-              "`score` (the share missed, 0 to 1).")
+              "`score` (the share missed, 0 to 1). Where `recording` or `frame` says what a run rebuilds, both are "
+              "compared pair by pair, too, and simulation narrows the interval as far as it foretells what is missed.")
 @click.option("--cluster", metavar="KEY",
               help="What errors may go by: recordings with one value of this parameter count as one, such as those of "
               f"a drive; or `recording`.  [default: the first of {', '.join(CLUSTER_KEYS)} that all frames have, else "
@@ -93,7 +105,7 @@ _EXTENSIONS = {".json": "json"}
 @click.option("--report", metavar="DIR", type=ANY_PATH,
               help="Write a page with pictures, too, the worst frames first: DIR/index.html, also in s3://...")
 @SENSORS
-def evaluate(results: tuple[AnyPath, ...], dataset: str, *, predictions: Path, distance: dict[str, float],
+def evaluate(results: tuple[AnyPath, ...], dataset: str, *, predictions: tuple[Path, ...], distance: dict[str, float],
              least_score: float | None, missing: str, simulated: Path | None, cluster: str | None, margin: float,
              seed: int, format_: str | None, output: AnyPath | None, report: AnyPath | None,
              sensors: Path | None) -> None:
@@ -116,10 +128,11 @@ def evaluate(results: tuple[AnyPath, ...], dataset: str, *, predictions: Path, d
     if file is not None:
         check_writable(file)
     opened = open_checked(dataset)
+    models = name_models(predictions) if len(predictions) > 1 else ("",)
     found = judge(
         {name: _asked(each, opened) for name, each in zip(names, results, strict=True)},
         opened,
-        predictions,
+        dict(zip(models, predictions, strict=True)),
         distance_m=distance,
         least_score=least_score,
         missing=cast("Missing", missing),
@@ -132,7 +145,8 @@ def evaluate(results: tuple[AnyPath, ...], dataset: str, *, predictions: Path, d
         _write(found, form, sink)
     show(found.warnings)
     if report is not None:
-        write_pages(found, opened, report, sensor_root(opened, sensors))
+        pages = found if len(models) > 1 else found.models[""]
+        write_pages(pages, opened, report, sensor_root(opened, sensors))
 
 
 def _asked(path: AnyPath, dataset: Dataset) -> Results:
@@ -148,15 +162,16 @@ def _format(name: str | None, file: AnyPath | None) -> str:
     return _EXTENSIONS.get(file.suffix) or choose_format(None, file)
 
 
-def _write(found: Evaluation, form: str, sink: BinaryIO) -> None:
+def _write(found: ModelsEvaluation, form: str, sink: BinaryIO) -> None:
     match form:
         case "json":
-            content = json.dumps(evaluation_record(found), ensure_ascii=False, indent=1, allow_nan=False)
+            record = models_record(found) if len(found.models) > 1 else evaluation_record(found.models[""])
+            content = json.dumps(record, ensure_ascii=False, indent=1, allow_nan=False)
             text = plain_json(content) + "\n"
         case "csv" | "spreadsheet":
             lines = io.StringIO(newline="")
             rows = CsvRows(lines, COLUMNS, spreadsheet=form == "spreadsheet")
-            for row in flat_rows(found):
+            for row in models_rows(found):
                 rows.write(row)
             text = lines.getvalue()
         case "parquet":
@@ -167,23 +182,37 @@ def _write(found: Evaluation, form: str, sink: BinaryIO) -> None:
     sink.write(text.encode(errors="backslashreplace"))
 
 
-def _write_parquet(found: Evaluation, sink: BinaryIO) -> None:
+def _write_parquet(found: ModelsEvaluation, sink: BinaryIO) -> None:
     import pyarrow as pa  # noqa: PLC0415 - not needed for the other formats
     import pyarrow.parquet as pq  # noqa: PLC0415
 
     schema = pa.schema([(name, pa.string() if kind is str else pa.float64()) for name, kind in COLUMNS.items()])
-    pq.write_table(pa.Table.from_pylist(list(flat_rows(found)), schema=schema), sink)
+    pq.write_table(pa.Table.from_pylist(list(models_rows(found)), schema=schema), sink)
 
 
-def _text(found: Evaluation) -> str:
+def _text(found: ModelsEvaluation) -> str:
+    if len(found.models) == 1:
+        return "\n".join(_model(found.models[""]))
+    lines = [*_titled(models_table(found)), ""]
+    lines += [plain(each.sentence) for each in found.pairs]
+    for name, each in found.models.items():
+        lines += ["", plain(name), "", *_model(each)]
+    return "\n".join(lines)
+
+
+def _titled(table: Table) -> list[str]:
+    title, head, rows = table
+    return [title, *columns([head, *rows])]
+
+
+def _model(found: Evaluation) -> list[str]:
     lines: list[str] = []
     if len(found.scenarios) > 1:
-        title, head, rows = overview(found)
-        lines += [title, *columns([head, *rows]), ""]
+        lines += [*_titled(overview(found)), ""]
     for each in found.scenarios:
         lines.append(f"{each.name}: {frame_counts(each)}")
-        for title, head, rows in tables(each, found.within):
-            lines += ["", title, *columns([head, *rows])]
+        for table in tables(each, found.within):
+            lines += ["", *_titled(table)]
         lines.append("")
         lines += [plain(one.sentence) for one in (*each.headline, *each.weighted)]
         lines += [plain(one.beside) for one in each.headline if one.asked]
@@ -192,4 +221,4 @@ def _text(found: Evaluation) -> str:
         lines.append("")
     if found.benchmark is not None:
         lines += [found.benchmark.sentence, ""]
-    return "\n".join(lines)
+    return lines

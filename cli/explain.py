@@ -69,7 +69,7 @@ def explain(
     ctx: click.Context, scenario: str | None, dataset: str | None, frame: str | None, *, program: str | None,
     smt2: AnyPath | None, exit_zero: bool, **given: Any
 ) -> None:  # fmt: skip
-    """Say why a frame or recording matches, or what keeps it from it and what would do.
+    """Say why a frame or recording matches, or what prevents it and which change would make it match.
 
     The explanation names the feature or requirement, its place in the program, and the label's value.
     """

@@ -58,12 +58,12 @@ class Writer(Protocol):
         ...
 
     def stop(self) -> None:
-        """The query is broken off: what was taken goes out where the format has a place for it."""
+        """The query ended early: write what is held back, if the format can."""
         ...
 
 
 class _Names:
-    """One line a frame that matches: its name, or the recording and start of an interval."""
+    """Writes a line for each match: the frame's name, or the recording and start of an interval."""
 
     def __init__(self, text: TextStream) -> None:
         self._text = text
@@ -81,7 +81,7 @@ class _Names:
 
 
 class _HeldBack:
-    """Writes each result when the next one comes, as the last one carries the summary: a line stays a result."""
+    """Writes each result when the next one comes, so that the last line can carry the summary and still be a result."""
 
     def __init__(self, text: TextStream, write: Callable[[Record | SummaryRecord], None]) -> None:
         self._text, self._write = text, write
@@ -122,7 +122,7 @@ class CsvRows:
         self._rows.writeheader()
 
     def write(self, row: Mapping[str, Any]) -> None:
-        """Write a row: texts as `csv_cells` has them, all else as it is."""
+        """Write a row: texts as `csv_cells` makes them, other values unchanged."""
         self._rows.writerow({name: quote_cell(value, spreadsheet=self._spreadsheet) for name, value in row.items()})
 
 
@@ -210,13 +210,13 @@ def make_writer(
     over_time: bool = False,
     every: bool = False,
 ) -> Writer:
-    """The writer of a format.
+    """Make the writer of a format.
 
     Args:
         name: One of `FORMATS`.
         sink: Where to; it stays open.
         roles: Gives the roles that results may name; asked where they are columns.
-        shorten: Gives what cuts names short; asked where a table would not fit the terminal.
+        shorten: Makes the functions that cut names; called where a table would not fit the terminal.
         recorded: Gives what the program records; asked where that is columns.
         origin: The dataset that the results come from; "" where it is not known.
         ranked: Whether results have a density.

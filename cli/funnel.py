@@ -36,7 +36,7 @@ def _steps(query: Query) -> list[tuple[str, str]]:
 
 
 def _chosen(funnel: Funnel) -> list[tuple[str, str]]:
-    """How many of the matches are shown, where that is a matter of what they carry."""
+    """Say how many matches are shown, where `--where` or `--sort` chooses."""
     chosen = funnel.chosen
     if chosen is None:
         return []
@@ -50,7 +50,7 @@ def _chosen(funnel: Funnel) -> list[tuple[str, str]]:
 
 
 def _over_time(funnel: Funnel) -> list[tuple[str, str]]:
-    """The steps of a query over time between frames and intervals; none for one about frames."""
+    """The steps between frames and intervals, for a query over time; none for one about frames."""
     told = {
         "starts": "frames that match the initial scene",
         "bindings": "ways to give the objects tracks from there on",

@@ -53,7 +53,7 @@ def _classes(dataset: Dataset) -> list[str]:
 
 
 def _questions(dataset: Dataset, observed: ObservedMotion) -> list[str]:
-    """What can be asked, and what not."""
+    """Say what can be asked of the dataset, and what cannot."""
     manifest = dataset.manifest
     rows = {name: sum(part.rows for part in parts) for name, parts in manifest.tables.items()}
     without_map = sorted(set(manifest.by_map) - set(manifest.maps))
@@ -97,7 +97,7 @@ def _tables(manifest: Manifest, *, named: bool) -> list[str]:
 
 
 def _rate(observed: ObservedMotion) -> str:
-    """How often there is a label."""
+    """Say how often there is a label."""
     steps = observed.steps
     if steps is None:
         return "no recording has two labels: nothing can be matched over time"
@@ -125,7 +125,7 @@ def _motion(dataset: Dataset, observed: ObservedMotion) -> list[str]:
 
 
 def _fit(fits: Sequence[MapFit], maps: int) -> list[str]:
-    """What was measured of the maps."""
+    """Say how well maps fit the labels."""
     if not fits:
         return []
 

@@ -29,7 +29,7 @@ __all__ = ["defects", "ingest"]
 
 
 def defects(left_out: tuple[LeftOut, ...]) -> list[str]:
-    """What was left out of a dataset, or kept with a defect, as lines; nothing where all is well."""
+    """Lines that say what was left out of a dataset, or kept with a defect; none where all is well."""
     lines: list[str] = []
     for kept, title in ((False, "left out"), (True, "kept with a defect")):
         entries = [entry for entry in left_out if entry.kept == kept]
@@ -51,7 +51,7 @@ def _lines(target: AnyPath, summary: IngestSummary, elapsed_s: float) -> list[st
 
 
 def _check_new(dataset: RemotePath, *, force: bool, update: bool) -> None:
-    """Refuse a place elsewhere that is not new or cannot be written, before the work."""
+    """Before the work, refuse a place elsewhere that is not new or cannot be written."""
     if force or update:
         message = f"{dataset} lies elsewhere, where a dataset is made new, and neither replaced nor updated"
         hint = "update it on this machine, and copy it there, `dataset.json` last"
@@ -64,7 +64,7 @@ def _check_new(dataset: RemotePath, *, force: bool, update: bool) -> None:
 
 @contextlib.contextmanager
 def _target(dataset: AnyPath) -> Generator[Path]:
-    """The folder in which a dataset is made; one of this machine that is sent afterwards, its manifest last."""
+    """Give a folder to make the dataset in; for a place elsewhere one here, which is sent in the end, manifest last."""
     if isinstance(dataset, Path):
         yield dataset
         return

@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM: a command that is asked to stop stops.
+"""Ctrl-C and SIGTERM: a command that is told to stop does stop.
 
 A `KeyboardInterrupt` can get lost on its way. What `__del__` or a callback of a weak reference raises is dropped: this
 happens to one interrupt in a hundred that come at random, as the locks of imports have such callbacks. Python tells of
@@ -33,7 +33,7 @@ _LOADED_S = 0.01
 
 
 class Interrupts:
-    """Whether this process was asked to stop.
+    """Notices that this process is to stop, and makes sure that it does.
 
     Attributes:
         noticed: Whether it was.
@@ -41,7 +41,7 @@ class Interrupts:
     """
 
     def __init__(self) -> None:
-        """Nothing is heeded yet."""
+        """Begin; signals are heeded from `heed` on."""
         self.noticed = False
         self.advice = ""
         self._until = 0.0
@@ -56,13 +56,13 @@ class Interrupts:
             sys.unraisablehook = self._dropped
 
     def done(self) -> None:
-        """The interrupt has arrived; what comes while the process ends is not raised again."""
+        """The interrupt has arrived: from now on nothing is raised again while the process ends."""
         if hasattr(signal, "setitimer"):
             signal.setitimer(signal.ITIMER_REAL, 0)
             signal.signal(signal.SIGALRM, signal.SIG_IGN)
 
     def _dropped(self, told: UnraisableHookArgs) -> None:
-        """Python drops an exception, as nobody is there to take it."""
+        """Called where Python drops an exception that nobody can take: an interrupt is raised again."""
         if told.exc_type is KeyboardInterrupt:
             signal.setitimer(signal.ITIMER_REAL, _AT_ONCE_S)
         else:

@@ -34,7 +34,7 @@ COMMANDS = {
     "gather": "Put the shards of a query together, in the order of the dataset.",
     "check": "Say whether a scenario is sound, and how it is read.",
     "sample": "Draw scenes from a scenario, as labels.",
-    "explain": "Say why a frame or recording matches, or what keeps it from it and what would do.",
+    "explain": "Say why a frame or recording matches, or what prevents it and which change would make it match.",
     "show": "Draw one frame from above: map, boxes, and what a scenario says of it.",
     "evaluate": "Say whether a model fails on the frames that match.",
     "report": "Say which matches came, went and stayed between two result files.",
@@ -125,7 +125,7 @@ class Commands(click.Group):
 
 @contextlib.contextmanager
 def _worded_end() -> Generator[None]:
-    """Makes a message and an exit code of whatever is raised in the block.
+    """Turn whatever the block raises into a message and an exit code.
 
     Raises:
         Exit: The code of click's.
@@ -159,7 +159,7 @@ def _worded_end() -> Generator[None]:
 
 
 def _is_of_output(error: Exception) -> bool:
-    """Whether standard output takes no more. Other files are looked after where they are written."""
+    """Whether an error says that standard output takes no more; errors of other files are told elsewhere."""
     if not isinstance(error, OSError) or error.filename is not None:
         return False
     if error.errno == errno.EBADF:
@@ -179,7 +179,7 @@ def _takes_data(descriptor: int) -> bool:
 
 
 def _let_go_of_output() -> None:
-    """What standard output did not take must not fail again when the interpreter ends, and take the exit code."""
+    """Drop what standard output did not take: it would fail again when Python ends, and change the exit code."""
     try:
         sys.stdout.flush()
     except OSError:
@@ -195,7 +195,7 @@ def _interrupted() -> NoReturn:
 
 
 def _written() -> str:
-    """Write what is needed to find a mistake into a file, and give its name."""
+    """Write a file with what is needed to find the mistake, and return its name."""
     import tempfile  # noqa: PLC0415 - these take long to load, and no run should need them
     import traceback  # noqa: PLC0415
 

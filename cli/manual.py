@@ -1,4 +1,4 @@
-"""What `--help` says of a command: purpose, arguments, options by topic, exit codes, examples."""
+"""Lay out `--help`: purpose, arguments, options by topic, exit codes, examples."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def variable_of(command: click.Command, option: click.Option) -> str:
 
 
 class Manual(click.Command):
-    """A command whose help reads like a page of a manual."""
+    """A command with help like a page of a manual."""
 
     def __init__(
         self,
@@ -57,14 +57,14 @@ class Manual(click.Command):
         topics: Mapping[str, Collection[str]] | None = None,
         **attributes: Any,
     ) -> None:
-        """Take what the help says besides what click knows.
+        """Take what the help says and click does not know.
 
         Args:
-            args: Of click's command.
+            args: What click's command takes.
             arguments: What each argument is, by the name that the usage shows.
             exits: Meaning of 0 and 1; the other codes mean the same everywhere.
             topics: Names of options (as parameters) by the heading that they stand under, those of no topic first.
-            attributes: Of click's command.
+            attributes: What click's command takes by name.
         """
         super().__init__(*args, **attributes)
         self.arguments = arguments
@@ -86,7 +86,7 @@ class Manual(click.Command):
             return super().invoke(ctx)
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Take the words of the command line; one that is no option may be a name, of which users are told.
+        """Parse the command line; a word that looks like a wrong option may be a file's name, and the message says so.
 
         Raises:
             click.UsageError: They do not fit.

@@ -52,7 +52,7 @@ __all__ = ["match"]
 
 
 def _near(query: Query, count: int | None) -> Iterator[Result]:
-    """The frames or recordings that come closest, looked for once the matches are there."""
+    """Look for the frames or recordings that come closest, after the matches."""
     if count is None or query.funnel.cut:
         return
     if query.is_over_time():
@@ -271,7 +271,7 @@ def match(ctx: click.Context, scenario: str | None, dataset: str | None, *, prog
 
 
 def _noted(found: Iterable[Result], recordings: list[str]) -> Iterator[Result]:
-    """The same results; the list takes the recording of each."""
+    """Pass results on, and note the recording of each in the list."""
     for result in found:
         recordings.append(result.recording)
         yield result
@@ -286,7 +286,7 @@ def _tell_far(query: Query) -> None:
 
 
 def _tell_cut(query: Query, *, resume: bool) -> None:
-    """Say that the time was over, also where no summary is printed."""
+    """Say that the deadline ended the query, even where no summary is printed."""
     done, total = query.funnel.frames, query.dataset.manifest.total.frames
     message = f"the deadline passed: {done:,} of {total:,} frames are decided, and the others are not in the results"
     again = "the same command goes on from here" if resume else "`--resume` with `-o FILE` keeps what is done"
@@ -294,7 +294,7 @@ def _tell_cut(query: Query, *, resume: bool) -> None:
 
 
 def _tell_unclear(selection: ResultSelection) -> None:
-    """Say that a condition is not known of some matches."""
+    """Say for how many matches the condition of `--where` is not known."""
     what = f"of {count(selection.unclear, 'match')} it is not known whether --where holds"
     message = f"{what}, as what is recorded is null: left out"
     hints = ("`unrecorded` of results says why",)
@@ -309,14 +309,14 @@ def _selection(query: Query, where: str | None, sort: str | None, limit: int | N
 
 
 def _filtered(query: Query, results: Generator[Result], selection: ResultSelection) -> Generator[Result]:
-    """The results that are wanted, up to the limit."""
+    """Pass on the matches that meet `--where`, up to the limit."""
     with contextlib.closing(results):
         yield from selection.filtered(results)
     query.funnel.limited = selection.last
 
 
 def _ordered(query: Query, results: Generator[Result], selection: ResultSelection) -> Generator[Result]:
-    """The results in the order that is wanted; then it is known which they are."""
+    """Sort the results by `--sort`, once all are there."""
     with contextlib.closing(results):
         yield from selection.ordered(results)
     query.funnel.chosen = selection.chosen()
@@ -325,7 +325,7 @@ def _ordered(query: Query, results: Generator[Result], selection: ResultSelectio
 def _selected(
     query: Query, results: Generator[Result], sample: int | None, *, rank: bool, diverse: bool
 ) -> Generator[Result]:
-    """Some of the matches, or all in another order, once all are there."""
+    """Sample or rank the matches, once all are there."""
     from scenicq.evaluate.ranking import rank_results, sample_diverse, sample_plain  # noqa: PLC0415 - takes long to load
 
     with contextlib.closing(results):

@@ -1,4 +1,4 @@
-"""Values of options on the command line: the kinds of `scenicq.option_values` as types of click."""
+"""The kinds of `scenicq.option_values` as types of click."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["OptionType"]
 
 
 class OptionType(click.ParamType):  # pyright: ignore[reportMissingTypeArgument] - click 8.1 has none
-    """The values of an option, in the words of all that reads options."""
+    """A type of click that reads values by a kind, so that messages are the same as in Python."""
 
     name = "value"
 

@@ -25,7 +25,7 @@ _EXTENSIONS = {".jsonl": "jsonl", ".csv": "csv", ".parquet": "parquet", ".txt": 
 
 
 def choose_format(name: str | None, file: AnyPath | None) -> str:
-    """The format that is asked for, else that of the file's extension, else what suits a terminal or a pipe.
+    """Choose the format: as the user says, else by the file's extension, else what suits a terminal or a pipe.
 
     Raises:
         DataError: option-invalid: the extension names no format, or the format is not for terminals.
@@ -46,7 +46,7 @@ def choose_format(name: str | None, file: AnyPath | None) -> str:
 
 @contextlib.contextmanager
 def writing(file: AnyPath | None) -> Generator[None]:
-    """Makes what the operating system says while results are written a message about their target.
+    """Turn errors of the operating system while results are written into a message about their target.
 
     Raises:
         DataError: target-unwritable.
@@ -62,7 +62,7 @@ def writing(file: AnyPath | None) -> Generator[None]:
 
 @contextlib.contextmanager
 def destination(file: AnyPath | None, folder: AnyPath | None = None) -> Generator[BinaryIO]:
-    """Standard output, or a file that gets its name at the end.
+    """Open standard output, or a file that gets its name at the end.
 
     Args:
         file: The file; standard output if None.
@@ -103,7 +103,7 @@ def _complete(name: Path, file: Path, folder: Path | None) -> Generator[BinaryIO
 
 
 class ProgressBar:
-    """Counts frames on standard error; silent where that is no terminal."""
+    """A progress bar on standard error; silent where that is no terminal."""
 
     def __init__(self, total: int | None = None, *, quiet: bool) -> None:
         """Show nothing yet.
@@ -119,18 +119,18 @@ class ProgressBar:
             self._bar = tqdm(total=total, unit=" frames", leave=False, file=sys.stderr)
 
     def advance(self, frames: int) -> None:
-        """So many frames more are done."""
+        """Count so many frames more."""
         if self._bar is not None:
             self._bar.update(frames)
 
     def reach(self, frames: int, total: int) -> None:
-        """So many frames are done of a total."""
+        """Show that so many frames of a total are done."""
         if self._bar is not None:
             self._bar.total = total
             self._bar.update(frames - self._bar.n)
 
     def aside(self) -> contextlib.AbstractContextManager[None]:
-        """Takes the bar away while results are written to the same terminal."""
+        """Hide the bar while results are written to the same terminal."""
         return contextlib.nullcontext() if self._bar is None else self._bar.external_write_mode(file=sys.stderr)
 
     def __enter__(self) -> Self:

@@ -1,4 +1,4 @@
-"""Paths on the command line: of files of this machine, or of what may lie elsewhere (`s3://...`) as well."""
+"""Types of paths on the command line: on this machine only, or also elsewhere (`s3://...`)."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def check_here(path: str | Path) -> None:
 
 
 def chosen_file(output: AnyPath | None) -> AnyPath | None:
-    """The file that is asked for; None for standard output, which `-` is, too."""
+    """The file to write; None for standard output, which `-` is, too."""
     return None if output is None or str(output) == "-" else output
 
 

@@ -1,4 +1,4 @@
-"""One shard of a query: a piece of the dataset, matched into a folder that all shards share."""
+"""Run one shard of a query: match a piece of the dataset, and write it into the folder of all shards."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Shard = tuple[int, int]
 
 
 class LateShardError(DataError):
-    """The time was over before a shard was finished."""
+    """The deadline came before a shard was finished."""
 
 
 def parse_shard(_ctx: click.Context, _parameter: click.Parameter, text: str | None) -> Shard | None:
@@ -40,7 +40,7 @@ def parse_shard(_ctx: click.Context, _parameter: click.Parameter, text: str | No
 
 
 def _whole(query: Query, shard: Shard, folder: AnyPath, bar: ProgressBar) -> Iterator[Record]:
-    """The records of a shard, all of them; what is asked is written once they are there, not by a run that is stopped.
+    """Yield the records of a shard, and fail in the end if the deadline cut them: a shard is kept whole or not at all.
 
     Raises:
         LateShardError: deadline-passed.
@@ -57,7 +57,7 @@ def _whole(query: Query, shard: Shard, folder: AnyPath, bar: ProgressBar) -> Ite
 
 
 def run_shard(query: Query, shard: Shard, folder: AnyPath, *, quiet: bool) -> tuple[Funnel, ResultSummary | None]:
-    """Match one shard into a folder, unless it is there already; what it found is counted, and says of itself."""
+    """Match one shard into a folder, unless its file is there already; return its counts and its summary."""
     number, count = shard
     question = name_question(query)
     pieces = partitions(query.dataset, count)

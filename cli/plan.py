@@ -1,4 +1,4 @@
-"""`scenicq match --explain`: what the database decides of a query, and what stays for the matcher."""
+"""`scenicq match --explain`: which frames SQL leaves out, and how many are left for the matcher."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["show_plan"]
 def show_plan(query: Query) -> None:
     """Print the prefilter of each map: its conditions in order, with the frames left after each, and its SQL.
 
-    The estimate is that of a sample; every step is then counted.
+    An estimate comes from a sample; then every step is counted.
     """
     for found in prefilter_counts(query):
         plan, left = found.plan, found.left

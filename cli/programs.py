@@ -50,7 +50,8 @@ LANES = click.option(
     type=option_type("lanes"),
     default="along",
     help="Which of several lanes that contain an object are its own, as in `ego.lane`: along, those that lead within "
-    "60 degrees of its heading, and all where none does or it has no heading; any, all of them.",
+    "60 degrees of its heading or go on from the last lane of its track, and all where none does or it has no heading; "
+    "any, all of them.",
 )
 """The option for the lanes of an object; see `compile_scenario`."""
 
@@ -75,7 +76,7 @@ PARAMS = click.option(
 
 
 def read_scenario(path: str | Path) -> Source:
-    """The program of a file, or of standard input for `-`.
+    """Read the program from a file, or from standard input for `-`.
 
     Raises:
         DataError: file-missing; file-invalid where it is not UTF-8 text; option-invalid where it lies elsewhere.
@@ -93,10 +94,10 @@ def read_scenario(path: str | Path) -> Source:
 def given_program(
     ctx: click.Context, text: str | None, words: Sequence[str | None], needed: int = 0
 ) -> tuple[Source, list[str | None], str | None]:
-    """The program and the other arguments of a command whose program may be an option.
+    """Tell the program from the other arguments, where the program may be an option.
 
     Args:
-        ctx: Of the command, for its usage.
+        ctx: The command's context, for its usage.
         text: The program itself, where it is given.
         words: The arguments in the order of the command's: the program, unless it is an option, and the others.
         needed: How many of the others must be there.

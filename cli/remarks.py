@@ -1,4 +1,4 @@
-"""What a user should know of a program before its results: what is never compared, and what cannot be meant."""
+"""Warn before the results of what in the program is never compared, and of what is hardly meant."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _LINES = 5
 
 
 def remarks(query: Query, maps: Sequence[str] | None = None) -> tuple[list[Diagnostic], list[Diagnostic]]:
-    """What is never compared, or what maps lack; and what compiles but cannot be meant.
+    """Collect warnings: what is never compared or lacking on maps, and what compiles but is hardly meant.
 
     Args:
         query: The query.
@@ -36,7 +36,7 @@ def remarks(query: Query, maps: Sequence[str] | None = None) -> tuple[list[Diagn
 
 
 def show_remarks(query: Query, unseen: Iterable[Diagnostic], found: Sequence[Diagnostic]) -> None:
-    """Print on standard error what is never compared or lacking, and a line for each thing that cannot be meant.
+    """Print these warnings on standard error: the first kind whole, a line for each of the second.
 
     All is said at once of a program that is no file.
 

@@ -1,4 +1,4 @@
-"""Text for people, on standard error: diagnostics, the funnel of a query, the sum of an ingest."""
+"""Text for people on standard error: diagnostics, counts, moments, aligned columns."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the sensor files of a dataset are, by the word of this user and of nobody else.
+"""Where the sensor files of a dataset are: only this user says, never the dataset itself.
 
 A dataset says where it was made from; but it may be a stranger's, and a report has small images in it of the files that
 it names. So the folder counts that this user gave to `ingest` when making just this dataset, or gives now.
@@ -40,10 +40,10 @@ SENSORS = click.option(
 def remember(folder: Path, source: Path) -> None:
     """Note that this user has made a dataset from a source, and that it is sound.
 
-    A home that cannot be written costs no more than that.
+    If the user's folder cannot be written, nothing is noted.
 
     Args:
-        folder: Of the dataset.
+        folder: The dataset's folder.
         source: What it was made from.
     """
     with contextlib.suppress(OSError, RuntimeError):
@@ -57,18 +57,18 @@ def remember(folder: Path, source: Path) -> None:
 
 
 def note_sound(place: Place, manifest: Manifest) -> None:
-    """Note that a dataset need not be looked at again as long as its files stay as they are.
+    """Note that a dataset is sound as long as its files stay as they are.
 
     Args:
-        place: Of the dataset.
-        manifest: Of the dataset.
+        place: Where the dataset is.
+        manifest: The dataset's manifest.
     """
     with contextlib.suppress(OSError, RuntimeError):
         _sound().add(place, manifest)
 
 
 def is_noted_sound(place: Place, manifest: Manifest) -> bool:
-    """Whether a dataset was made or found to be sound by this user, and is as it was then."""
+    """Whether this user made a dataset or found it sound, and it has not changed since."""
     try:
         return _sound().has(place, manifest)
     except (OSError, RuntimeError):
@@ -80,7 +80,7 @@ def _sound() -> SoundNotes:
 
 
 def recorded(dataset: Dataset) -> Path | None:
-    """The source from which this user has made a dataset, wherever it lies now; None for one of somebody else's."""
+    """The source that this user made a dataset from, wherever the dataset is now; None if somebody else made it."""
     digest = _digest(dataset.place.manifest())
     found = None
     with contextlib.suppress(OSError, RuntimeError, ValueError), _notes().open(encoding="utf-8") as file:
@@ -95,7 +95,7 @@ def sensor_root(dataset: Dataset, given: Path | None) -> Path | None:
 
     Args:
         dataset: The dataset, in whose own folder they may always lie.
-        given: By the user.
+        given: What the user gives.
     """
     root = given or recorded(dataset)
     if root is None and any(part.rows for part in dataset.manifest.tables["sensors"]):

@@ -1,4 +1,4 @@
-"""Where the process begins: whatever goes wrong while the program loads ends it with 2, never with Python's own 1.
+"""The entry of the process: an error while the program loads ends it with 2, never with Python's own 1.
 
 1 means that nothing matched, and whoever runs a query in a script must be able to believe it.
 
@@ -49,7 +49,7 @@ def main() -> None:
 
 
 def _fill_streams() -> None:
-    """Open what the caller has closed: else the next file takes its number, and messages go into it."""
+    """Open the streams that the caller closed: else the next file gets their number, and messages go into it."""
     for number in range(3):
         try:
             os.fstat(number)
@@ -61,7 +61,7 @@ def _fill_streams() -> None:
 
 
 class _Messages(io.FileIO):
-    """Standard error: where it takes nothing, nobody reads messages, and the command does its work all the same."""
+    """Standard error; if it takes nothing, messages are lost and the command goes on."""
 
     def write(self, b: ReadableBuffer, /) -> int:
         taken: int | None = None  # also of what takes nothing now
@@ -80,7 +80,7 @@ def _set_results_apart() -> TextIO:
 
 
 def _address_space() -> int | None:
-    """To how many bytes of memory the caller limits this process; None where to none."""
+    """The limit of address space that the caller set, in bytes; None if there is none."""
     try:
         import resource  # noqa: PLC0415 - not everywhere
     except ImportError:
@@ -90,7 +90,7 @@ def _address_space() -> int | None:
 
 
 def _save_memory() -> None:
-    """Have libraries take little address space, and OpenBLAS its buffer now: without, it ends the process with 1.
+    """Make libraries take little address space, and OpenBLAS its buffer now: if it fails later, it exits with 1.
 
     By default the C library sets 64 MB aside for each thread: a third of all that a query takes.
     """
@@ -118,7 +118,7 @@ def _line(error: BaseException) -> str:
 
 
 def _end(text: str, code: int) -> None:
-    """Say a line and end at once: what Python does when it ends may fail again, and choose another code."""
+    """Print a line and exit at once: Python's own clean-up may fail again and change the exit code."""
     try:
         os.write(2, f"{text}\n".encode(errors="backslashreplace"))
     finally:

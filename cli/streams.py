@@ -20,7 +20,7 @@ _STREAMS: list[TextIO] = []
 
 @contextlib.contextmanager
 def only_results() -> Generator[None]:
-    """Within the block, what libraries print in Python goes to standard error, and `results` is standard output."""
+    """In the block, what libraries print in Python goes to standard error; `results` is standard output."""
     _STREAMS.append(sys.stdout)
     try:
         with contextlib.redirect_stdout(sys.stderr):
@@ -35,5 +35,5 @@ def results() -> TextIO:
 
 
 def say(text: str = "", *, nl: bool = True) -> None:
-    """Write text to standard output, with a new line; colours only where somebody looks at it."""
+    """Write a line to standard output; with colours only on a terminal."""
     click.echo(text, file=results(), nl=nl)

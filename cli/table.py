@@ -50,7 +50,7 @@ class TextStream:
         self._sink.flush()
 
     def isatty(self) -> bool:
-        """Whether somebody looks at it, and so colours make sense."""
+        """Whether this is a terminal, so that colours make sense."""
         return self._sink.isatty()
 
 
@@ -101,7 +101,7 @@ class Table:
 
 
 def fitted(rows: list[Row], width: int, short: ShortNames, *, over_time: bool = False) -> list[str]:
-    """Rows as lines of a table that is no wider than it may be, the head first; no word is broken.
+    """Lay rows out as lines of a table of at most a width, the head first; no word is broken.
 
     Names are cut to what tells them apart; what all rows share, or other columns say, is left out; long cells go on
     below.
@@ -151,7 +151,7 @@ def fitted(rows: list[Row], width: int, short: ShortNames, *, over_time: bool = 
 
 
 def _fits(head: Sequence[str], table: Sequence[Sequence[str]], kept: list[int], width: int) -> bool:
-    """Whether rows fit without long cells going on below."""
+    """Whether rows fit without breaking long cells."""
     widths = [max(len(plain(row[column])) for row in (head, *table)) for column in kept]
     return sum(widths) + 2 * (len(kept) - 1) <= width
 
@@ -175,7 +175,7 @@ def _longest_word(table: Sequence[Sequence[str]], column: int) -> int:
 
 
 def _narrowest(table: Sequence[Sequence[str]], kept: list[int]) -> int:
-    """The width below which a word would have to be broken, with some room for long cells."""
+    """The least width at which no word is broken, with some room for long cells."""
     widths = [
         max(_NARROWEST, _longest_word(table, column))
         if column in (_VERDICT, _OBJECTS)
@@ -241,7 +241,7 @@ def _cells(record: Record) -> Row:
 
 
 def _recorded(record: Record) -> str:
-    """What a match carries, in short; over an interval from the least to the greatest."""
+    """The recorded values of a match, in short; over an interval from the least to the greatest."""
     return ", ".join(f"{name} {_short(value)}" for name, value in (record.recorded or {}).items())
 
 

@@ -1,4 +1,4 @@
-"""The folders of this user in which the program keeps what it can do without: what it remembers, and what it has made.
+"""The user's folders for what the program can do without: notes, and files that can be made again.
 
 `SCENICQ_STATE=off` keeps both from being read or written.
 """
@@ -28,7 +28,7 @@ def _base(variable: str, usual: str) -> Path:
 
 
 def state_folder() -> Path:
-    """The folder of what this program remembers for this user; it need not be there.
+    """The folder of this user's notes; it need not be there.
 
     Raises:
         RuntimeError: The user has no home, or wants nothing to be remembered.
@@ -43,7 +43,7 @@ def state_folder() -> Path:
 
 
 def user_cache() -> Path:
-    """The folder of what can be made again; it need not be there.
+    """The folder of files that can be made again; it need not be there.
 
     Raises:
         RuntimeError: The user has no home.
@@ -57,7 +57,7 @@ def user_cache() -> Path:
 
 @contextmanager
 def map_cache() -> Generator[Path]:
-    """The folder of maps that have been converted; one that goes again where nothing is to be kept."""
+    """The folder of converted maps; a temporary one where nothing is to be kept."""
     if not _is_off():
         yield user_cache() / "maps"
         return

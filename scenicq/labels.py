@@ -15,14 +15,20 @@ from functools import cached_property
 from importlib import import_module
 from typing import Any, cast
 
-from scenicq.geometry import measures
+import numpy as np
+
+from scenicq.geometry import measures, shapes
 from scenicq.geometry.boxes import box_polygon
 from scenicq.geometry.driven_courses import CoursePlace, lane_course
+from scenicq.geometry.lane_stretches import ahead_in_lanes
 from scenicq.geometry.measures import NEVER, STANDING_MPS, MovingBoxes
 from scenicq.geometry.network import Network
+from scenicq.geometry.own_directions import along_centerline
 from scenicq.geometry.regions import PolylineSet
+from scenicq.geometry.road_direction import RoadDirection
 
 __all__ = [
+    "ahead",
     "along",
     "beside",
     "box_distance",
@@ -42,6 +48,16 @@ __all__ = [
 
 
 _MAP_SLACK_M = (1e-9, 0.05)
+
+
+def ahead(owner: Any, distance: Any) -> Any:
+    """What lies in the lanes of an object, from it to so many metres on, as one of Scenic's regions.
+
+    Args:
+        owner: The object; where it is in no lane, nothing lies ahead.
+        distance: Metres along the middle of the lanes.
+    """
+    return _sampled(_ahead)(owner, distance)
 
 
 def along(owner: Any, place: Any) -> Any:
@@ -81,24 +97,25 @@ def others(of: Any) -> list[Any]:
     return []
 
 
-def count(of: Any, *, within: Any = None) -> int:
+def count(of: Any, *, within: Any = None, ahead: bool = False) -> int:
     """How many objects of a class there are but the ego, in a region if one is given; for requirements alone.
 
     Args:
         of: One of Scenic's classes.
         within: A region that their centres lie in.
+        ahead: Whether they are to be ahead of the ego, along its course.
     """
-    return len(_objects(of, within))
+    return len(_objects(of, within, ahead))
 
 
-def nearest(of: Any, *, within: Any = None) -> Any:
+def nearest(of: Any, *, within: Any = None, ahead: bool = False) -> Any:
     """The nearest to the ego of those that `count` counts, the first of equally near ones.
 
     Returns:
         The object; where there is none, what is no object, and rejects the scene once something is read of it.
     """
     x, y = _xy(import_module("scenic.syntax.veneer").ego())
-    found = _objects(of, within)
+    found = _objects(of, within, ahead)
     return min(found, key=lambda each: math.hypot(_xy(each)[0] - x, _xy(each)[1] - y), default=_Nobody())
 
 
@@ -164,13 +181,19 @@ def post_encroachment_time(one: Any, other: Any) -> Any:
     return _sampled(_post_encroachment_time)(one, other)
 
 
-def _objects(of: Any, within: Any) -> list[Any]:
+def _objects(of: Any, within: Any, ahead: bool) -> list[Any]:
     """The objects of a class in the scene, or in the simulation that runs, but the ego."""
     veneer = import_module("scenic.syntax.veneer")
     scene = veneer.currentSimulation or veneer.currentScenario
     ego = veneer.ego()
     found = [each for each in scene.objects if each is not ego and isinstance(each, of)]
-    return [each for each in found if within is None or within.containsPoint(each.position)]
+    found = [each for each in found if within is None or within.containsPoint(each.position)]
+    return [each for each in found if _is_ahead(_place_of(ego), each)] if ahead else found
+
+
+def _is_ahead(course: CoursePlace, place: Any) -> bool:
+    low, high, _, _ = course.ends(*_xy(place))
+    return low > 0 or (high > 0 and _known(low, high) > 0)
 
 
 class _Nobody:
@@ -222,6 +245,13 @@ def _deceleration_to_avoid(one: Any, other: Any) -> float:
 
 def _box(owner: Any) -> Any:
     return box_polygon(*_xy(owner), float(owner.heading), float(owner.width), float(owner.length))
+
+
+def _ahead(owner: Any, distance: float) -> Any:
+    network = cast(Network, _ScenicMap(getattr(owner, "_lane", None)))
+    parts = ahead_in_lanes(network, *_xy(owner), float(owner.heading), None, float(distance))
+    regions = import_module("scenic.core.regions")
+    return regions.PolygonalRegion(polygon=shapes.union_all(parts)) if parts else regions.nowhere
 
 
 def _along(owner: Any, place: Any) -> float:
@@ -296,6 +326,19 @@ class _ScenicLane:
     def centerline(self) -> PolylineSet:
         line = import_module("shapely.geometry").LineString([(x, y) for x, y, *_ in self.lane.centerline.points])
         return PolylineSet((line,), "the middle of a lane")
+
+    @property
+    def polygon(self) -> Any:
+        return self.lane.polygon
+
+    @cached_property
+    def orientation(self) -> RoadDirection | None:
+        lines = tuple(np.array(each.coords) for each in self.centerline.lines)
+        return along_centerline(self.id, self.polygon, lines)
+
+    @property
+    def number(self) -> int:
+        return -1
 
     @property
     def successors(self) -> list[_ScenicLane]:

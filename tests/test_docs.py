@@ -1,19 +1,27 @@
 """What is written about the commands and folders is complete."""
 
 import re
+import tomllib
 from pathlib import Path
 
 import click
 import pytest
 
-from scenicq.limits import LIMITS
+from scenicq.errors import CODES
+from scenicq.limits import LIMITS, Beyond, limits
 from scenicq.match.options import MatchOptions
 from scenicq.store.classes import ROOT as ROOT_CLASS
 from scenicq.store.classes import ancestors, subclasses
+from scenicq.store.schema import SCHEMA_VERSION, UPGRADABLE
 from scenicq_cli.main import COMMANDS, cli
 
 ROOT = Path(__file__).parents[1]
-README = (ROOT / "README.md").read_text(encoding="utf-8")
+REFERENCE = (ROOT / "cli" / "README.md").read_text(encoding="utf-8")
+PAGES = {
+    page.relative_to(ROOT).as_posix(): page.read_text(encoding="utf-8")
+    for page in (ROOT / "README.md", ROOT / "cli" / "README.md", *sorted((ROOT / "scenicq" / "docs").glob("*.md")))
+}
+"""What is written for users."""
 
 
 def _command(name):
@@ -21,19 +29,21 @@ def _command(name):
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_every_command_has_help_an_example_and_a_place_in_the_readme(name):
+def test_every_command_has_help_an_example_and_a_place_in_the_reference(name):
     command = _command(name)
     assert command.help
     assert re.search(rf"Examples?:\n  scenicq {name}\b", command.epilog)
-    assert f"scenicq {name}" in README
+    assert f"scenicq {name}" in REFERENCE
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_every_option_has_help_and_is_in_the_readme(name):
+def test_every_option_has_help_and_is_in_the_reference(name):
     for parameter in _command(name).params:
         if isinstance(parameter, click.Option):
             assert parameter.help, parameter.name
-            assert any(f"`{option}" in README or f" {option}" in README for option in parameter.opts), parameter.opts
+            assert any(f"`{option}" in REFERENCE or f" {option}" in REFERENCE for option in parameter.opts), (
+                parameter.opts
+            )
 
 
 @pytest.mark.parametrize("name", COMMANDS)
@@ -42,11 +52,16 @@ def test_examples_use_only_options_that_there_are(name):
     assert set(re.findall(r"(?<!\S)--?[a-z][a-z0-9-]*", _command(name).epilog)) <= known | {"--help"}
 
 
-def test_the_readme_names_only_options_that_there_are():
-    known = {"--help", "--version"}
+@pytest.mark.parametrize("page", PAGES)
+def test_pages_for_users_name_only_options_that_there_are(page):
+    known = {"--help", "--version", *OTHERS.get(page, ())}
     for name in COMMANDS:
         known |= {o for parameter in _command(name).params for o in (*parameter.opts, *parameter.secondary_opts)}
-    assert set(re.findall(r"(?<![\w-])--[a-z][a-z0-9-]+", README)) <= known
+    assert set(re.findall(r"(?<![\w-])--[a-z][a-z0-9-]+", PAGES[page])) <= known
+
+
+OTHERS = {"scenicq/docs/CONTRIBUTING.md": {"--spec"}}
+"""Options of other programs, by page."""
 
 
 def _reference():
@@ -71,10 +86,31 @@ def _class_tree():
     return "\n".join([*lines, ""])
 
 
+_BLOCK = re.compile(r"^```scenic[^\n]*\n(.*?)^```", re.DOTALL | re.MULTILINE)
+
+
+def _codes():
+    """Each code with its meaning, and the shortest program of the pages of the language that shows it."""
+    shown = {}
+    for page in sorted((ROOT / "tests" / "language").glob("*.md")):
+        for block in _BLOCK.finditer(page.read_text(encoding="utf-8")):
+            for code in re.findall(r"# (?:error|warning|note): \[([a-z-]+)\]", block[1]):
+                shown.setdefault(code, []).append((len(block[1]), page.name, block[1]))
+    parts = []
+    for code, meaning in CODES.items():
+        part = f"## {code}\n\n{meaning[0].upper()}{meaning[1:]}.\n"
+        if code in shown:
+            _, name, program = min(shown[code])
+            part += f"\n```scenic\n{program}```\n\nFrom [{name.removesuffix('.md')}](../../tests/language/{name}).\n"
+        parts.append(part)
+    return "\n".join(parts)
+
+
 @pytest.mark.parametrize(
     ("page", "start", "end", "written"),
     [
-        ("README.md", "<!-- commands: `make golden` writes this -->\n", "<!-- end of commands -->", _reference),
+        ("scenicq/docs/codes.md", "<!-- codes: `make golden` writes this -->\n", "<!-- end of codes -->", _codes),
+        ("cli/README.md", "<!-- commands: `make golden` writes this -->\n", "<!-- end of commands -->", _reference),
         (
             "tests/language/world-model.md",
             "<!-- classes: `make golden` writes this -->\n",
@@ -114,8 +150,23 @@ def test_help_fits_a_page_and_has_every_section():
         ("it has {:,} characters", LIMITS.program_characters),
     ],
 )
-def test_limits_are_those_that_the_readme_names(sentence, limit):
-    assert sentence.format(limit) in " ".join(README.split())
+def test_limits_are_those_that_the_page_names(sentence, limit):
+    assert sentence.format(limit) in " ".join(PAGES["scenicq/docs/limits.md"].split())
+
+
+def test_the_page_of_matches_explains_every_reason_of_an_unknown():
+    page = " ".join(PAGES["scenicq/docs/matching.md"].partition("is unknown\n")[2].replace("`", "").split())
+    reasons = {each.more for each in limits() if each.beyond is Beyond.UNDECIDED} | {"unobserved"}
+    assert len(reasons) > 10
+    short = {reason.removesuffix(" to tell apart").removeprefix("too many ") for reason in reasons}
+    assert [reason for reason in short if reason not in page] == []
+
+
+def test_the_glossary_is_short_and_in_order():
+    parts = PAGES["scenicq/docs/glossary.md"].split("\n## ")[1:]
+    words = [re.findall(r"^\| (.+?) \|", part, re.MULTILINE)[1:] for part in parts]
+    assert all(part == sorted(part, key=str.lower) for part in words)
+    assert 40 <= sum(map(len, words)) <= 60
 
 
 def test_every_make_target_is_explained():
@@ -124,8 +175,32 @@ def test_every_make_target_is_explained():
     assert targets == set(re.findall(r"^([a-z-]+):.*## ", text, re.MULTILINE))
 
 
-def test_every_folder_of_the_library_is_described():
-    text = (ROOT / "scenicq" / "README.md").read_text(encoding="utf-8")
-    folders = [path.name for path in (ROOT / "scenicq").iterdir() if (path / "__init__.py").exists()]
-    assert folders
-    assert [name for name in folders if f"`{name}" not in text] == []
+EVERYWHERE = [
+    ROOT / "README.md",
+    *(page for folder in ("cli", "sample_data", "scenicq", "tests") for page in sorted((ROOT / folder).rglob("*.md"))),
+]
+
+
+@pytest.mark.parametrize("page", EVERYWHERE, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_links_lead_to_files(page):
+    text = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
+    links = [link for link in re.findall(r"\]\(([^)\s]+)\)", text) if not re.match(r"https?:|#", link)]
+    assert [link for link in links if not (page.parent / link.partition("#")[0]).exists()] == []
+
+
+def test_the_page_of_licences_names_every_package():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    wanted = [
+        *project["dependencies"],
+        *(each for extra in project["optional-dependencies"].values() for each in extra),
+    ]
+    names = {re.match(r"[\w.-]+", each)[0] for each in wanted} - {"scenicq"}
+    told = set(re.findall(r"[\w.-]+\w", PAGES["scenicq/docs/licences.md"]))
+    assert names - told == set()
+
+
+def test_the_page_of_versions_says_what_becomes_of_each():
+    rows = dict(re.findall(r"^\| (\d+) \|(.*)\|$", PAGES["scenicq/docs/versions.md"], re.MULTILINE))
+    assert {int(number) for number in rows} == set(range(1, SCHEMA_VERSION + 1))
+    # what came with a version is in the row of that version, and what brings older datasets to it
+    assert {int(number) - 1 for number, text in rows.items() if "`scenicq index`" in text} == UPGRADABLE

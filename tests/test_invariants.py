@@ -1,4 +1,4 @@
-"""What scenicq/README.md claims of the code that no other test guards."""
+"""What scenicq/README.md and the decisions claim of the code that no other test guards."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ ROOT = Path(__file__).parents[1]
 LIBRARY = ROOT / "scenicq"
 FILES = sorted(LIBRARY.rglob("*.py"))
 README = (LIBRARY / "README.md").read_text()
+DECISIONS = {page.name: page.read_text() for page in sorted((LIBRARY / "decisions").glob("*.md"))}
 
 PASSES = ("forest/", "match/", "query/prefilter/", "temporal/")
 """Where expressions are gone through. Syntax and compiler recurse over the program's text, which the parser limits."""
@@ -156,6 +157,13 @@ def test_the_core_knows_no_dataset():
 def test_no_sentence_begins_with_of():
     for file in FILES:
         assert not re.search(r'"Of |[.;] Of [a-z`]', file.read_text()), named(file)
+    for page in (
+        ROOT / "README.md",
+        *LIBRARY.rglob("*.md"),
+        *(ROOT / "tests").rglob("*.md"),
+        *(ROOT / "cli").glob("*.md"),
+    ):
+        assert not re.search(r"(^|\n|[.;:] |[-*] )Of ", page.read_text()), page
 
 
 def test_the_matcher_is_a_page():
@@ -237,23 +245,55 @@ def test_docstrings_name_errors_that_exist():
     assert sum(map(len, found.values())) > 100
 
 
-def test_every_path_that_the_map_names_exists():
-    paths = re.findall(r"(?<![\w/.])((?:tests|scenicq|sample_data|cli)/[\w./]*[\w/])", README)
-    assert paths
-    assert [path for path in paths if not (ROOT / path).exists()] == []
-    inside = re.findall(
-        r"`((?:match|query|smt|forest|compiler|report|store|geometry|temporal|syntax|importers)/[\w./]+\.py)`", README
+WORDS = 3_000
+"""A page that says where things are is read whole."""
+
+
+def sections(page: str) -> dict[str, str]:
+    """The text under each heading of the second level."""
+    return dict(zip(*[iter(re.split(r"^## (.*)$", page, flags=re.MULTILINE)[1:])] * 2, strict=True))
+
+
+def test_the_map_is_short():
+    assert len(README.split()) <= WORDS
+
+
+def test_the_map_names_every_folder():
+    told = SECTIONS["Folders, top to bottom"]
+    folders = [path for path in LIBRARY.rglob("*") if path.is_dir() and any(path.glob("*.py"))]
+    assert len(folders) > 20
+    missing = [path.name for path in (*folders, ROOT / "cli", LIBRARY / "decisions") if f"`{path.name}/" not in told]
+    assert missing == []
+
+
+def test_every_path_that_pages_for_contributors_name_exists():
+    folders = "|".join(path.name for path in LIBRARY.iterdir() if path.is_dir())
+    guides = {page.name: page.read_text() for page in (LIBRARY / "docs").glob("*.md")}
+    for name, page in [("the map", README), *DECISIONS.items(), *guides.items()]:
+        paths = re.findall(r"(?<![\w/.])((?:tests|scenicq|sample_data|cli)/[\w./-]*[\w/])", page)
+        assert [path for path in paths if not (ROOT / path).exists()] == [], name
+        inside = re.findall(rf"`((?:{folders})/(?:[\w/]+/|[\w/]+\.\w+|))`", page)
+        assert [path for path in inside if not (LIBRARY / path).exists()] == [], name
+
+
+def test_decisions_say_first_what_holds_and_last_what_was():
+    index = DECISIONS["README.md"]
+    assert re.findall(r"\]\(([\w-]+\.md)\)", index) == sorted(
+        (name for name in DECISIONS if name != "README.md"), key=lambda name: index.index(f"({name})")
     )
-    assert inside
-    assert [path for path in inside if not (LIBRARY / path).exists()] == []
+    for name, page in DECISIONS.items():
+        if name != "README.md":
+            titles = list(sections(page))
+            assert titles[0].startswith("What "), name
+            assert titles[-1] == "History", name
 
 
-SECTIONS = dict(zip(*[iter(re.split(r"^## (.*)$", README, flags=re.MULTILINE)[1:])] * 2, strict=True))
+SECTIONS = sections(README)
 MOST_HOPS = 3
 QUESTIONS = {
     "Where is position tolerance applied?", "What happens to a random lane?", "Why was this frame no match?",
-    "Where would a new distribution go?", "Where is a requirement turned into SQL?",
-    "What runs when nothing is hidden?", "Which limit ended this search?",
+    "Where is a requirement turned into SQL?", "What runs when nothing is hidden?",
+    "Which limit ended this search?",
 }  # fmt: skip
 
 
@@ -273,13 +313,13 @@ def defined(file: Path) -> set[str]:
 
 def rows(section: str) -> list[list[str]]:
     """The rows of a section's table, without its head."""
-    lines = [line for line in SECTIONS[section].splitlines() if line.startswith("|")]
+    lines = [line for line in section.splitlines() if line.startswith("|")]
     return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines[2:]]
 
 
 def test_each_question_of_a_stranger_is_answered_in_three_files_at_most():
     asked: set[str] = set()
-    for question, path in rows("Where to look"):
+    for question, path in rows(SECTIONS["Where to look"].partition("What is new")[0]):
         asked.add(question)
         hops = re.findall(r"`([\w/]+\.py)`(?: \(([^)]*)\))?", path)
         assert 1 <= len(hops) <= MOST_HOPS, question
@@ -287,6 +327,15 @@ def test_each_question_of_a_stranger_is_answered_in_three_files_at_most():
             assert (LIBRARY / file).exists(), file
             assert set(re.findall(r"`(\w+)`", told)) <= defined(LIBRARY / file), (question, file)
     assert asked >= QUESTIONS
+
+
+def test_the_places_of_what_is_new_are_there():
+    table = SECTIONS["Where to look"].partition("What is new")[2]
+    told = re.findall(r"`([\w/]+\.py)` \(`(\w+)`", table)
+    assert len(told) > 5
+    for file, name in told:
+        path = ROOT / file if file.startswith("cli/") else LIBRARY / file
+        assert name in defined(path), (file, name)
 
 
 def imports(file: Path) -> set[str]:
@@ -315,6 +364,9 @@ def test_a_solver_in_a_process_of_its_own_knows_formulas_and_no_nodes():
     assert {"formula", "inverse_elimination"} <= seen
 
 
+STEPS = sections(DECISIONS["matching.md"])["Steps of matching"]
+
+
 def test_every_step_of_matching_is_one_that_is_measured():
     source = tree(ROOT / "tests/bench/steps.py")
     (measured,) = (
@@ -323,29 +375,41 @@ def test_every_step_of_matching_is_one_that_is_measured():
         if isinstance(node, ast.AnnAssign) and ast.unparse(node.target) == "STEPS" and isinstance(node.value, ast.Dict)
     )
     # without the cascade nothing is decided, and no solver is asked there
-    assert {name for name, *_ in rows("Steps of matching")} == {*measured, "cascade", "solver"}
+    assert {name for name, *_ in rows(STEPS)} == {*measured, "cascade", "solver"}
 
 
 def test_every_step_of_matching_names_its_file():
-    assert [file for _, file, *_ in rows("Steps of matching") if not (LIBRARY / file.strip("`")).exists()] == []
+    assert [file for _, file, *_ in rows(STEPS) if not (LIBRARY / file.strip("`")).exists()] == []
 
 
-def test_every_name_in_the_map_is_one_of_the_code():
+def names_of_the_code() -> set[str]:
+    """Names of files, and all that stands in them."""
     known: set[str] = set()
     for file in (*FILES, *(ROOT / "cli").rglob("*.py")):
         known |= {*file.relative_to(ROOT).parts, file.stem}
         for node in ast.walk(tree(file)):
             for field in ("name", "id", "attr", "arg"):
                 known.add(str(getattr(node, field, "")))
-    text = "".join(text for title, text in SECTIONS.items() if title != "Decisions")
-    named_ = {name for name in re.findall(r"`([^`]+)`", text) if re.fullmatch(r"[\w./]+", name)}
-    missing = {name for name in named_ if not known.issuperset(re.split(r"[./]", name.strip("/")))}
-    # files and commands that are no code of the library
-    assert {name for name in missing if not (ROOT / name).exists() and not re.search(r"\.py$", name)} == {"scenicq_cli"}
+    return known
 
 
-def test_the_map_names_every_file_of_the_engine():
-    folders = SECTIONS["Folders, top to bottom"]
-    told = {word for name in re.findall(r"`([^`]+)`", folders) for word in re.split(r"[/.]", name)}
-    inside = [file for file in FILES if named(file).startswith(("match/", "query/", "forest/", "temporal/"))]
-    assert [named(file) for file in inside if file.stem not in told | {"__init__"}] == []
+def test_every_name_in_pages_for_contributors_is_one_of_the_code():
+    known = names_of_the_code()
+    for page, text in {"README.md": README, **DECISIONS}.items():
+        # what was tried, and what was, has names that are gone
+        today = "".join(
+            part for title, part in sections(text).items() if title not in ("Tried and left out", "History")
+        )
+        told = {name for name in re.findall(r"`([^`]+)`", today) if re.fullmatch(r"[\w./]+", name)}
+        missing = {name for name in told if not known.issuperset(re.split(r"[./]", name.strip("/")))}
+        missing = {name for name in missing if not (ROOT / name).exists() and not re.search(r"\.(py|md|json)$", name)}
+        assert missing == ALIEN.get(page, set()), page
+
+
+ALIEN = {
+    "execution.md": {"print", "_SUCCESS", "ProcessPoolExecutor", "httpfs"},
+    "language.md": {"if", "and", "or", "Object", "OrientedPoint"},
+    "store.md": {"numpy.polyfit"},
+    "testing.md": {"one_in"},
+}
+"""Names on a page that are not of the code: of Scenic, of Python, of packages and of the tests."""

@@ -7,10 +7,12 @@ import sys
 from types import ModuleType, SimpleNamespace
 
 import pytest
+import shapely
 
 from scenicq import labels
 from scenicq.geometry.default_street import street
 from scenicq.geometry.driven_courses import lane_course
+from scenicq.geometry.lane_stretches import ahead_in_lanes, own_lanes
 
 
 class Rejected(Exception):
@@ -26,6 +28,7 @@ def scenic(monkeypatch):
     made["scenic.syntax.veneer"] = ModuleType("scenic.syntax.veneer")
     made["scenic.core.regions"] = ModuleType("scenic.core.regions")
     made["scenic.core.regions"].PolygonalRegion = lambda polygon: polygon
+    made["scenic.core.regions"].nowhere = "nowhere"
     made["scenic.core.regions"].PolylineRegion = lambda polyline: polyline
     for name, module in made.items():
         monkeypatch.setitem(sys.modules, name, module)
@@ -86,6 +89,22 @@ def test_regions_are_scenics(scenic, lanes):
     assert corridor.area == pytest.approx(300 + 7.07, abs=0.1)
     nowhere = SimpleNamespace(position=(0.0, 0.0), heading=0.0)
     assert labels.along(nowhere, (0.0, 20.0)) == 20
+
+
+def test_what_lies_ahead_is_that_of_our_own_map(scenic, lanes):
+    network, draw = street(), random.Random(1)
+    compared = 0
+    for _ in range(40):
+        x, y, heading = draw.uniform(-12, 12), draw.uniform(-12, 12), draw.uniform(-3, 3)
+        near = network.lanesAt(x, y)
+        owner = SimpleNamespace(position=(x, y, 0), heading=heading, _lane=lanes[near[0].id] if near else None)
+        parts = ahead_in_lanes(network, x, y, heading, None, 30.0)
+        if parts:
+            assert labels.ahead(owner, 30).symmetric_difference(shapely.union_all(parts)).area < 1e-6
+            compared += len(own_lanes(network, x, y, heading, None)) < len(near)
+        else:
+            assert labels.ahead(owner, 30) == "nowhere"
+    assert compared > 5
 
 
 class Car(SimpleNamespace):

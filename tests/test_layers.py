@@ -16,10 +16,16 @@ def test_contracts_on_imports_are_kept():
     assert "Contracts: 7 kept, 0 broken." in done.stdout
 
 
+PAGES = {"decisions", "docs"}
+"""Folders of pages for those who have the sources."""
+
+
 def test_every_folder_is_shipped():
     listed = set(SETTINGS["tool"]["setuptools"]["packages"])
     folders = {
-        path.parent.relative_to(ROOT) for path in (ROOT / "scenicq").rglob("*.*") if "__pycache__" not in path.parts
+        path.parent.relative_to(ROOT)
+        for path in (ROOT / "scenicq").rglob("*.*")
+        if "__pycache__" not in path.parts and path.relative_to(ROOT).parts[1] not in PAGES
     }
     assert listed == {".".join(folder.parts) for folder in folders} | {"scenicq_cli"}
 
@@ -27,6 +33,10 @@ def test_every_folder_is_shipped():
 def test_every_data_file_is_shipped():
     patterns = SETTINGS["tool"]["setuptools"]["package-data"]
     for file in (ROOT / "scenicq").rglob("*"):
-        if file.is_file() and file.suffix not in (".py", ".pyc", ".md"):
+        if (
+            file.is_file()
+            and file.suffix not in (".py", ".pyc", ".md")
+            and file.relative_to(ROOT).parts[1] not in PAGES
+        ):
             package = ".".join(file.parent.relative_to(ROOT).parts)
             assert any(file.match(pattern) for pattern in patterns.get(package, ())), file

@@ -56,7 +56,7 @@ def page() -> str:
         for words in [(each.beyond.value, each.more)]
     ]
     head = (
-        "# Limits\n\nEvery limit at which a search ends: how much is allowed, of what, and what happens beyond.\n"
+        "# Every limit\n\nEvery limit at which a search ends: how much is allowed, of what, and what happens beyond.\n"
         "Made from `limits.py` by `make golden`.\n\n| limit | most | of what | beyond |\n|---|---|---|---|\n"
     )
     return head + "\n".join(rows) + "\n"

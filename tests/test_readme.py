@@ -1,7 +1,8 @@
-"""The commands that the README shows are run, in the folder of the sample data, and print what it shows.
+"""The commands and programs that pages for users show are run, in the folder of the sample data.
 
 In a `console` block, a line `$ command` is run; the lines up to the next command are compared with what it prints on
-standard output and error, where `...` stands for anything. Blocks that start with `$ make` or `$ pip` are for reading.
+standard output and error, where `...` stands for anything. Lines that start with `$ make` or `$ pip` are for reading.
+Each `python` block is run as a file of its own.
 """
 
 import re
@@ -14,10 +15,14 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
-
-
-def _blocks(language):
-    return re.findall(rf"```{language}\n(.*?)```", README, re.DOTALL)
+_BLOCK = re.compile(r"^```(console|python)\n(.*?)^```", re.DOTALL | re.MULTILINE)
+PAGES = [
+    page
+    for page in (ROOT / "README.md", ROOT / "cli" / "README.md", *sorted((ROOT / "scenicq" / "docs").glob("*.md")))
+    if _BLOCK.search(page.read_text(encoding="utf-8"))
+]
+WORDS = 1_500
+"""As many as are read in five minutes, with the tables in between."""
 
 
 def _steps(block):
@@ -31,44 +36,48 @@ def _matches(expected, actual):
     return re.fullmatch(".*".join(parts), actual.strip(), re.DOTALL) is not None
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    """A folder with the sample data, in which the blocks run one after the other."""
-    here = tmp_path_factory.mktemp("readme")
-    shutil.copytree(ROOT / "sample_data", here / "sample_data")
-    return here
+def _run_block(kind, text, folder, command):
+    """Run a block of a page; what it prints is what stands there."""
+    if kind == "python":
+        done = subprocess.run([sys.executable, "-c", text], cwd=folder, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+        if "for found in crossing:" in text:
+            assert len(re.findall(r"^03-busy-intersection/\d\d {'ego': 'ego'", done.stdout, re.MULTILINE)) == 5
+        return
+    for line, expected in _steps(text):
+        if not line.startswith(("make", "pip", "git", "cd")):
+            words = line.replace("scenicq ", f"{command} ", 1)
+            done = subprocess.run(
+                words, shell=True, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False
+            )
+            actual = re.sub(r"[ \t]+$", "", done.stdout, flags=re.MULTILINE)
+            assert _matches(expected, actual), f"$ {line}\n{actual}"
 
 
-def test_the_commands_print_what_is_shown(folder, command):
-    ran = 0
-    for block in _blocks("console"):
-        for line, expected in _steps(block):
-            if not line.startswith(("make", "pip", "git", "cd")):
-                words = line.replace("scenicq ", f"{command} ", 1)
-                done = subprocess.run(
-                    words,
-                    shell=True,
-                    cwd=folder,
-                    stdout=subprocess.PIPE,
-                    stderr=subprocess.STDOUT,
-                    text=True,
-                    check=False,
-                )
-                actual = re.sub(r"[ \t]+$", "", done.stdout, flags=re.MULTILINE)
-                assert _matches(expected, actual), f"$ {line}\n{actual}"
-                ran += 1
-    assert ran >= 6
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_what_a_page_shows_is_what_happens(page, crossroads, command, tmp_path):
+    shutil.copytree(ROOT / "sample_data", tmp_path / "sample_data")
+    if page.parent != ROOT:  # the first page says how `town` is made
+        shutil.copytree(crossroads, tmp_path / "town")
+    for block in _BLOCK.finditer(page.read_text(encoding="utf-8")):
+        _run_block(block[1], block[2], tmp_path, command)
 
 
-def test_the_python_example_runs(folder, command):
-    subprocess.run([command, "ingest", "sample_data/crossroads", "town", "-q", "--force"], cwd=folder, check=True)
-    (program,) = _blocks("python")
-    done = subprocess.run([sys.executable, "-c", program], cwd=folder, capture_output=True, text=True, check=True)
-    assert len(re.findall(r"^03-busy-intersection/\d\d {'ego': 'ego'", done.stdout, re.MULTILINE)) == 5
+def test_the_readme_and_four_pages_show_what_happens():
+    assert len(PAGES) >= 5
+
+
+def test_the_readme_is_read_in_five_minutes():
+    assert len(README.split()) <= WORDS
+
+
+def test_two_commands_set_up_a_fresh_machine():
+    start = README.partition("## Start")[2].partition("\n## ")[0]
+    assert re.findall(r"^\$ (make.*)$", start, re.MULTILINE) == ["make demo", "make test"]
 
 
 def test_the_scenario_shown_is_the_one_that_is_run():
-    (shown,) = _blocks("scenic")
+    (shown,) = re.findall(r"```scenic\n(.*?)```", README, re.DOTALL)
     file = (ROOT / "sample_data" / "scenarios" / "02_crossing_cars.scenic").read_text(encoding="utf-8")
     assert file.partition("\n")[2].strip() == shown.strip()
 

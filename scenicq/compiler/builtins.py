@@ -314,12 +314,12 @@ def truth(value: ModelValue, span: Span) -> bool:
     if is_node(value):
         if isinstance(value, Constant):
             return bool(value.value)
-        raise fail("random-branch", "the program's course depends on a random value", span, "random here",
+        raise fail("random-branch", "`if` and loops cannot depend on a random value", span, "random here",
                    ("use `require` to state a condition on random values",
                     "use `Uniform(...)` or `Discrete({...})` to choose between values"))  # fmt: skip
     if isinstance(value, Choice):
-        raise fail("random-branch", "the program's course depends on a random choice", span, "random here")
+        raise fail("random-branch", "`if` and loops cannot depend on a random choice", span, "random here")
     if isinstance(value, Delayed):
-        raise fail("wrong-type", "the program's course depends on an object that is not there yet", span,
+        raise fail("wrong-type", "`if` and loops cannot depend on an object that is not there yet", span,
                    "depends on an object's position", ("write `F at V`",))  # fmt: skip
     return bool(value)

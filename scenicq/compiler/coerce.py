@@ -16,7 +16,7 @@ from scenicq.errors import Span
 from scenicq.forest.angle_wrap import any_turn
 from scenicq.forest.build import compare, constant, vector
 from scenicq.forest.kinds import kind_of
-from scenicq.forest.nodes import COURSE, GOING, CompareOp, Constant, Feature, Kind, Node, Select, Undefined
+from scenicq.forest.nodes import COURSE, GOING, LAST_LANE, CompareOp, Constant, Feature, Kind, Node, Select, Undefined
 from scenicq.geometry.elements import NetworkElement
 from scenicq.geometry.regions import Everywhere, Region
 from scenicq.syntax.hints import condition_hint
@@ -50,6 +50,7 @@ OBSERVABLE: dict[str, Kind] = {
     "acceleration": "scalar",
     COURSE: "other",
     GOING: "other",
+    LAST_LANE: "other",
 }
 """Properties that a label can observe, by kind: references to them are conditioned on the label."""
 

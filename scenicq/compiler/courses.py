@@ -75,7 +75,7 @@ class _Taken(Course):
 
 
 def _refused(span: Span, label: str) -> ScenarioError:
-    return fail("random-branch", "the program's course depends on a random value", span, label,
+    return fail("random-branch", "`if` and loops cannot depend on a random value", span, label,
                 ("draw it before, outside of the condition",))  # fmt: skip
 
 

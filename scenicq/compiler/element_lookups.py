@@ -117,18 +117,29 @@ class LookupTable:
         places: list[Layer] = []
         ids: list[tuple[str, ...]] = []
         ways: list[tuple[RoadDirection | None, ...]] = []
+        continued: list[tuple[frozenset[int], ...]] = []
+        names: list[tuple[str, ...]] = []
         for layer in layers:
             owners = {owner: number for number, owner in enumerate(dict.fromkeys(owner for _, _, owner in layer))}
             parts = [(part, *entry) for entry in layer for part in shapes.simple_parts([entry[0].polygon])]
             ids.append(tuple(area.id for _, area, _, _ in parts))
             ways.append(tuple(each.orientation if isinstance(each, Lane) else None for each in owners))
+            continued.append(tuple(map(_continued, owners)))
+            names.append(tuple(owner.id for owner in owners))
             places.append(
                 tuple(
                     (part, nothing if element is None else numbers[element], owners[owner])
                     for part, _, element, owner in parts
                 )
             )
-        self.occupancy = Occupancy(tuple(places), nothing, name, tuple(ids), tuple(ways))
+        self.occupancy = Occupancy(
+            tuple(places), nothing, name, tuple(ids), tuple(ways), tuple(continued), tuple(names)
+        )
+
+
+def _continued(owner: NetworkElement) -> frozenset[int]:
+    """The numbers of the lanes that a lane continues."""
+    return frozenset(each.number for each in (owner, *owner.predecessors)) if isinstance(owner, Lane) else frozenset()
 
 
 class Lookups:
@@ -157,17 +168,17 @@ class Lookups:
             self.tables[key] = LookupTable(name, family, layers())
         return self.tables[key]
 
-    def index(self, key: object, table: LookupTable, place: Node, going: Node | None, span: Span) -> Node:
+    def index(self, key: object, table: LookupTable, place: Node, going: tuple[Node, ...], span: Span) -> Node:
         """Which option lies at a random place; of several one that leads the way somebody goes, if that is given."""
         where = (place.object, place.property, place.current) if isinstance(place, Feature) else id(place)
-        whose = (key, going is not None), where
+        whose = (key, bool(going)), where
         if whose not in self.indices:
             self._kept.append(place)
             self.indices[whose] = self._make_index(table, place, going, where, span)
         return self.indices[whose]
 
     def numbers(
-        self, table: LookupTable, place: Node, span: Span, count: int | None = None, going: Node | None = None
+        self, table: LookupTable, place: Node, span: Span, count: int | None = None, going: tuple[Node, ...] = ()
     ) -> tuple[Node, ...]:
         """The numbers of the options at a place, by rank: all, or so many of them; after the last the first again.
 
@@ -176,20 +187,19 @@ class Lookups:
             place: The place.
             span: Where they are asked for.
             count: How many.
-            going: Which way goes who is there, where that matters.
+            going: Which way goes who is there and the last lane of its track, where that matters.
         """
         options = table.occupancy
         scale = build.constant(float(options.scale), span)
-        by = () if going is None else (going,)
 
         def number(rank: int) -> Node:
-            ranked = ElementAtPoint(options, rank, by_heading=bool(by))
-            angle = DirectionAt(build.constant(ranked, span), place, by, span=span)
+            ranked = ElementAtPoint(options, rank, by_heading=bool(going))
+            angle = DirectionAt(build.constant(ranked, span), place, going, span=span)
             return build.arithmetic(ArithmeticOp.MUL, angle, scale, span=span)
 
         return tuple(map(number, range(options.depth if count is None else count)))
 
-    def _make_index(self, table: LookupTable, place: Node, going: Node | None, where: object, span: Span) -> Node:
+    def _make_index(self, table: LookupTable, place: Node, going: tuple[Node, ...], where: object, span: Span) -> Node:
         depth = table.occupancy.depth
         if depth == 1:
             return self.numbers(table, place, span)[0]

@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import TYPE_CHECKING
 
+from scenicq.compiler.lanes_ahead import ahead
 from scenicq.compiler.measures import (
     box_distance,
     course_change,
@@ -34,6 +35,7 @@ LABELS = "scenicq.labels"
 """What programs call the module."""
 
 QUESTIONS: Mapping[str, Callable[..., ModelValue]] = {
+    "ahead": ahead,
     "along": along,
     "beside": beside,
     "box_distance": box_distance,

@@ -1,4 +1,7 @@
-"""The area of a lane and of those that it leads to: maps cut lanes as they like, often after a few metres."""
+"""The area of a lane and of those that it leads to, and what of it lies ahead of an object.
+
+Maps cut lanes as they like, often after a few metres.
+"""
 
 from __future__ import annotations
 
@@ -6,15 +9,37 @@ import heapq
 import math
 from typing import TYPE_CHECKING
 
-from scenicq.compiler.values import ModelValue, describe, fail
+from scenicq.compiler.coerce import to_vector
+from scenicq.compiler.lookups import going_of
+from scenicq.compiler.values import Instance, ModelValue, describe, fail
 from scenicq.errors import Span
+from scenicq.forest import build
+from scenicq.forest.nodes import AheadInLanes, Constant, Node
 from scenicq.geometry.elements import Lane
 from scenicq.geometry.regions import PolygonSet
 
 if TYPE_CHECKING:
     from scenicq.compiler.interpreter import Interpreter
 
-__all__ = ["lanes_ahead"]
+__all__ = ["ahead", "lanes_ahead"]
+
+
+def ahead(run: Interpreter, span: Span, owner: ModelValue, distance: ModelValue) -> Node:
+    """`ahead(obj, d)` of `scenicq.labels`: what lies in an object's lanes, from it to so many metres on.
+
+    Raises:
+        ScenarioError: wrong-type, where it is no object; wrong-value, for what is no positive known number.
+    """
+    if not isinstance(owner, Instance) or owner.index is None:
+        shown = f"a hidden `{owner.cls.name}`" if isinstance(owner, Instance) else describe(owner)
+        raise fail("wrong-type", f"{shown} has no lanes: `ahead` asks for those of an object", span,
+                   "no object here", ("name an object, such as `ego`",))  # fmt: skip
+    number = distance.value if isinstance(distance, Constant) else distance
+    if isinstance(number, bool) or not isinstance(number, int | float) or not 0 < number < 1e6:
+        raise fail("wrong-value", "`ahead` needs a known number of metres, which is positive", span,
+                   f"this is {number if isinstance(number, int | float) else describe(distance)}")  # fmt: skip
+    way, last = going_of(run, owner, span) or (build.constant(None, span), build.constant(None, span))
+    return AheadInLanes(to_vector(owner, span), way, last, build.constant(float(number)), run.network, span=span)
 
 
 def lanes_ahead(run: Interpreter, lane: Lane, distance: ModelValue, span: Span) -> PolygonSet:

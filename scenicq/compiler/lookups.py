@@ -3,8 +3,9 @@
 At a known place it is one element, or None. At a random one it is a random choice between the elements whose index is
 a function of the place (see `occupancy`), so that any two look-ups at one place agree; its attributes are again random
 choices. Where elements of one kind overlap, any of them may be meant; which one is chosen once for a place, for lanes,
-their sections, groups and roads together. Those lanes at an object's place are its own that lead its way
-(`ElementAtPoint.along`), unless all are asked for (`LaneRule`): `obj.lane`, its sections, groups and roads.
+their sections, groups and roads together. Those lanes at an object's place are its own that lead its way or continue
+the last of its track (`ElementAtPoint.along`), unless all are asked for (`LaneRule`): `obj.lane`, its sections, groups
+and roads.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ from scenicq.compiler.element_lookups import LOOKUPS, LookupTable, own, ways_at,
 from scenicq.compiler.known_properties import as_constant
 from scenicq.compiler.values import Choice, Instance, ModelValue, fail
 from scenicq.errors import Span
-from scenicq.forest.nodes import GOING, Constant, Node, Vector
+from scenicq.forest import build
+from scenicq.forest.nodes import GOING, LAST_LANE, Constant, Node, Vector
 from scenicq.geometry.elements import Intersection, NetworkElement
 from scenicq.geometry.network import Network
 from scenicq.geometry.occupancy import ElementAtPoint
@@ -25,7 +27,7 @@ from scenicq.geometry.occupancy import ElementAtPoint
 if TYPE_CHECKING:
     from scenicq.compiler.interpreter import Interpreter
 
-__all__ = ["among", "look_up", "look_up_of", "look_up_ways"]
+__all__ = ["among", "going_of", "look_up", "look_up_of", "look_up_ways"]
 
 
 def look_up_of(run: Interpreter, owner: Instance, name: str, reject: ModelValue, span: Span) -> ModelValue:
@@ -41,12 +43,19 @@ def look_up_of(run: Interpreter, owner: Instance, name: str, reject: ModelValue,
     Raises:
         ScenarioError: As `look_up`.
     """
-    going: Node | None = None
-    if run.lanes == "along" and LOOKUPS[name][0] == "lane" and owner.index is not None:
-        if GOING not in owner.properties:
-            owner.properties[GOING] = to_heading(owner, span)
-        going = to_node(property_node(owner, GOING, span), span)
+    going = going_of(run, owner, span) if LOOKUPS[name][0] == "lane" else ()
     return look_up(run, run.network, name, owner, reject, span, going)
+
+
+def going_of(run: Interpreter, owner: Instance, span: Span) -> tuple[Node, ...]:
+    """Which way an object goes and the last lane of its track; nothing where all lanes are its own."""
+    if run.lanes == "any" or owner.index is None:
+        return ()
+    if GOING not in owner.properties:
+        owner.properties[GOING] = to_heading(owner, span)
+        # who is in a scene has been nowhere before
+        owner.properties[LAST_LANE] = build.constant(None, span)
+    return tuple(to_node(property_node(owner, name, span), span) for name in (GOING, LAST_LANE))
 
 
 def look_up(
@@ -56,7 +65,7 @@ def look_up(
     point: ModelValue,
     reject: ModelValue,
     span: Span,
-    going: Node | None = None,
+    going: tuple[Node, ...] = (),
 ) -> ModelValue:
     """`network.laneAt(point)` and its like.
 
@@ -67,7 +76,7 @@ def look_up(
         point: The place.
         reject: Whether there is no scene where there is no element; then the result is never None.
         span: The call.
-        going: Which way goes who is there, where that tells its lanes from others.
+        going: Which way goes who is there and the last lane of its track, where that tells its lanes from others.
 
     Raises:
         ScenarioError: impossible-requirement, where there is no element at a known place but must be.
@@ -105,7 +114,7 @@ def _at(
     span: Span,
     known: Callable[[float, float], ModelValue] | None,
     nothing: ModelValue = None,
-    going: Node | None = None,
+    going: tuple[Node, ...] = (),
 ) -> ModelValue:
     run.budget.step(span, run.budget.LOOK_UP_STEPS)
     place = to_vector(point, span)
@@ -113,7 +122,7 @@ def _at(
     options = (*table.options, nothing)
     if isinstance(certain, Constant):
         x, y = cast(Vector, certain.value)
-        heading = None if going is None else as_constant(run, going)
+        heading = as_constant(run, going[0]) if going else None
         if isinstance(heading, Constant) and isinstance(heading.value, float):
             first = ElementAtPoint(table.occupancy, 0, by_heading=True)
             found = options[round(first.along(x, y, heading.value) * table.occupancy.scale)]

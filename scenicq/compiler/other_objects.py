@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, cast
 
 from scenicq.compiler import operators
 from scenicq.compiler.coerce import OBSERVABLE, property_node, to_boolean
+from scenicq.compiler.road_courses import along
 from scenicq.compiler.values import Instance, LabelObjects, ModelValue, Nearest, OtherList, ScenicClass, describe, fail
 from scenicq.errors import Span
 from scenicq.forest import build
@@ -29,6 +31,7 @@ from scenicq.forest.nodes import (
     Compare,
     CompareOp,
     Constant,
+    CourseCoordinate,
     DirectionAt,
     Feature,
     Index,
@@ -71,19 +74,19 @@ def others(run: Interpreter, span: Span, *args: ModelValue, **named: ModelValue)
 
 
 def count(run: Interpreter, span: Span, *args: ModelValue, **named: ModelValue) -> ModelValue:
-    """`count(C, within=R)`."""
+    """`count(C, within=R, ahead=True)`."""
     if args and isinstance(args[0], OtherList) and len(args) == 1 and not named:
         return how_many(args[0], span)
     cls = _class(run, span, "count", args, named, _FILTERS)
     every = __all_of(run, cls, span)
     element = _element(every, span)
-    return _among(AmongOp.COUNT, every, element, _counting(named, span)(element), span)
+    return _among(AmongOp.COUNT, every, element, _counting(run, named, span)(element), span)
 
 
 def nearest(run: Interpreter, span: Span, *args: ModelValue, **named: ModelValue) -> ModelValue:
-    """`nearest(C, within=R)`."""
+    """`nearest(C, within=R, ahead=True)`."""
     cls = _class(run, span, "nearest", args, named, _FILTERS)
-    every, counts, ego = __all_of(run, cls, span), _counting(named, span), run.ego(span)
+    every, counts, ego = __all_of(run, cls, span), _counting(run, named, span), run.ego(span)
     made = Nearest(cls, None, span, objects=every, counts=counts, ego=ego)
     element = _element(every, span)
     away = operators.distance_to(element, ego, span)
@@ -174,7 +177,7 @@ def how_many(items: OtherList | LabelObjects, span: Span) -> Node:
     return _among(AmongOp.COUNT, items.objects, items.element, _all_of(items.conditions, span), span)
 
 
-_FILTERS = ("within",)
+_FILTERS = ("within", "ahead")
 
 
 def _class(
@@ -206,14 +209,30 @@ def _who(each: Instance, name: str, span: Span) -> Feature:
     return Feature(cast(int, each.index), name, "scalar", True, span=span)
 
 
-def _counting(named: Mapping[str, ModelValue], span: Span) -> Callable[[Instance], Node]:
+def _counting(run: Interpreter, named: Mapping[str, ModelValue], span: Span) -> Callable[[Instance], Node]:
+    ahead = named.get("ahead", False)
+    if not isinstance(ahead, bool):
+        raise fail("wrong-type", "`ahead=` is True or False", span, f"this is {describe(ahead)}")
+
     def counts(element: Instance) -> Node:
-        if "within" not in named:
-            return build.constant(True)
-        # by its centre, as a point in the region
-        return operators.within(property_node(element, "position", span), named["within"], span)
+        # by its centre, as a point in the region and on the course
+        place, asked = property_node(element, "position", span), list[Node]()
+        if "within" in named:
+            asked.append(operators.within(place, named["within"], span))
+        if ahead:
+            asked.append(_is_ahead(along(run, span, run.ego(span), place), span))
+        return _all_of(tuple(asked), span=span) if asked else build.constant(True)
 
     return counts
+
+
+def _is_ahead(far: CourseCoordinate, span: Span) -> Node:
+    """Whether what is known up to two ends is above 0."""
+    least, most, itself = (
+        Compare(CompareOp.GT, each, build.constant(0.0), span=span)
+        for each in (replace(far, end=0), replace(far, end=1), far)
+    )
+    return build.logic(LogicOp.OR, least, build.logic(LogicOp.AND, most, itself, span=span), span=span)
 
 
 _all_of = partial(build.connect, LogicOp.AND)

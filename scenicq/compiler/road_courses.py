@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 __all__ = ["along", "beside", "corridor", "course", "course_of"]
 
 
-def along(run: Interpreter, span: Span, owner: ModelValue, place: ModelValue) -> Node:
+def along(run: Interpreter, span: Span, owner: ModelValue, place: ModelValue) -> CourseCoordinate:
     """How far ahead of an object a place is on the object's course, in metres; behind it negative."""
     return CourseCoordinate(course_of(run, owner, "along", span), _known_place(place, "along", span), 0, span=span)
 

@@ -31,14 +31,14 @@ _OBJECT = ("x", "y", "heading", "width", "length", "height", "vx", "vy", "z")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frames:
-    """The frames of a dataset, in its order.
+    """The frames of a dataset as columns, in its order.
 
     Attributes:
-        names: Of the frames.
-        numbers: Number of each name.
+        names: The frames' names.
+        numbers: The number of each frame, by name.
         recordings: Names of the recordings.
         recording: Number of the recording of each frame, shape (n,).
-        timestamp_us: Shape (n,).
+        timestamp_us: When each frame was recorded, shape (n,).
         maps: Names of the maps.
         map: Number of the map of each frame, shape (n,).
         ego_x, ego_y, ego_heading: The centre of the ego, shape (n,).
@@ -71,8 +71,8 @@ class Annotations:
         tracks: Identifiers of the physical object, as an Arrow array; empty where there is none.
         frame: Number of the frame, shape (n,).
         classes, source_classes: Names of classes: of the class tree, and the source's own.
-        category, source_category: Numbers of them, shape (n,).
-        x, y, heading, width, length, height, vx, vy, z: Shape (n,); nan where unknown.
+        category, source_category: The class of each object, as a number in these, shape (n,).
+        x, y, heading, width, length, height, vx, vy, z: As labels have them, shape (n,); nan where unknown.
         attributes: Names of attributes.
         attribute: Number of the attribute that counts, -1 without, shape (n,).
         points: How many points the source counts in the box, by the attribute that says so; -1 where it does not.
@@ -106,7 +106,7 @@ class Annotations:
 def read_annotations(
     dataset: Dataset, points: tuple[str, ...] = (), groups: tuple[str, ...] = ()
 ) -> tuple[Frames, Annotations]:
-    """All labels of a dataset.
+    """Read all labels of a dataset.
 
     Args:
         dataset: The dataset.
@@ -180,7 +180,7 @@ def _annotations(objects: Any, points: tuple[str, ...], groups: tuple[str, ...])
 
 
 def _codes(column: Any, absent: str = "") -> tuple[list[str], Numbers]:
-    """Distinct texts, and the number of each row's."""
+    """Number texts: the distinct ones, and the number of each row's text."""
     encoded = column.fill_null(absent).combine_chunks().dictionary_encode()
     return encoded.dictionary.to_pylist(), encoded.indices.to_numpy(zero_copy_only=False).astype(np.int32)
 

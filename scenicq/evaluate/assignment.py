@@ -1,4 +1,4 @@
-"""Which prediction is which label object: by centre distance, the highest score first, each object once."""
+"""Assign predictions to label objects: by centre distance, the highest score first, each object once."""
 
 # duckdb and pyarrow have no complete type stubs.
 # pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
@@ -54,7 +54,7 @@ class Pairs:
 
 
 def find_pairs(predictions: Centres, objects: Centres, reach_m: float, *, nearest_only: bool = False) -> Pairs:
-    """The pairs of one frame and class that lie nearer than a distance.
+    """Find the pairs of one frame and class that lie nearer than a distance.
 
     Args:
         predictions: In any order.
@@ -100,7 +100,7 @@ def _table(boxes: Centres) -> Any:
 
 
 def assign(pairs: Pairs, rank: Numbers, objects: int, threshold_m: float, *, nearest_only: bool = False) -> Numbers:
-    """The label object of each prediction, -1 where it has none, shape (predictions,).
+    """Assign a label object to each prediction, -1 where it gets none, shape (predictions,).
 
     In the order of rank each prediction takes the nearest object that is still free. Here all predictions ask at once:
     an object keeps the one of the highest rank among those that have asked, the others ask the next nearest. As all
@@ -108,7 +108,7 @@ def assign(pairs: Pairs, rank: Numbers, objects: int, threshold_m: float, *, nea
 
     Args:
         pairs: Near pairs.
-        rank: Of each prediction, 0 the first, shape (predictions,).
+        rank: The rank of each prediction, 0 the first, shape (predictions,).
         objects: How many label objects there are.
         threshold_m: Pairs at this distance or more do not count.
         nearest_only: Whether a prediction whose nearest object is taken, however far that is, gets no other.

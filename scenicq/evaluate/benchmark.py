@@ -1,4 +1,4 @@
-"""What a benchmark says of a model as a whole: the means over its classes, and its own score.
+"""A benchmark's own figures for a model as a whole: means over its classes, and its score.
 
 nuScenes' NDS is that of Caesar et al., *nuScenes: a multimodal dataset for autonomous driving*, 2020, section 3.1;
 Argoverse's CDS that of Wilson et al., *Argoverse 2*, 2021. Both are over all frames, whatever a scenario matches, so
@@ -36,7 +36,7 @@ class BenchmarkFigures:
         errors: Means over the classes for which they mean something, by name; units of `ERRORS`. Where nothing was
             found a class has the largest error.
         measure: What the score is called, "NDS" or "CDS".
-        score: It, 0 to 1.
+        score: The score, 0 to 1.
         classes: How many classes there are.
         without_labels: Classes of which no label object counts; they have an average precision of 0, as there.
     """
@@ -70,7 +70,7 @@ class BenchmarkFigures:
 
 
 def benchmark_figures(detection: Detection) -> BenchmarkFigures | None:
-    """What the benchmark of a kind of file says; None for kinds that have no benchmark.
+    """Work out a benchmark's figures; None for files of no benchmark.
 
     Args:
         detection: Labels and predictions.

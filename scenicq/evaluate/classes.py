@@ -36,7 +36,7 @@ class ClassFigures:
         distance_m: The centre distance.
         objects, predictions: How many there are, predictions of the least score asked for only.
         recordings: Effective number of clusters.
-        recall, precision: Of the predictions that have the least score asked for.
+        recall, precision: Those of the predictions that have the least score asked for.
         average_precision: Over all scores.
         errors: By name, at `ERRORS_AT_M` only.
     """

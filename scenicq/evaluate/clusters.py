@@ -1,4 +1,4 @@
-"""Which recordings belong together, and under which parameters frames were recorded."""
+"""Group recordings into clusters, and frames by their parameters."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Clusters:
 
 
 def find_clusters(frames: Frames, key: str | None = None) -> Clusters:
-    """The clusters of frames.
+    """Find the clusters of frames.
 
     Args:
         frames: The dataset's.
@@ -67,7 +67,7 @@ def find_clusters(frames: Frames, key: str | None = None) -> Clusters:
 
 
 def _joined(value: Numbers, recording: NDArray[np.int32]) -> tuple[Numbers, int]:
-    """The cluster of each frame: a recording in which the value changes joins those of all its values."""
+    """The cluster of each frame; a recording in which the value changes joins the clusters of all its values."""
     pairs = np.unique(np.column_stack((value, recording)), axis=0)
     recordings = np.split(pairs[:, 1], np.flatnonzero(np.diff(pairs[:, 0])) + 1)
     parts = connected_components([each.tolist() for each in recordings])

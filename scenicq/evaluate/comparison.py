@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from statistics import NormalDist
 from typing import Literal
@@ -30,11 +30,16 @@ from scenicq.evaluate.resampling import (
 __all__ = [
     "DISTANCES_M",
     "MARGIN",
+    "MISSES",
+    "Groups",
     "ObjectComparison",
     "Says",
     "Share",
+    "ShareComparison",
+    "clusters_to_tell",
     "compare",
     "distance_names",
+    "few_clusters",
     "p_text",
     "percent",
     "share_of",
@@ -54,7 +59,7 @@ _VERDICT = 6.0
 """Effective number of clusters below which no difference can be told: the flips of five have no p-value under 0.05."""
 _OTHERS = 10.0
 """Effective number of others below which there is no verdict."""
-_MISSES = 5.0
+MISSES = 5.0
 """Misses of both groups, at their effective numbers, below which there is no verdict."""
 _ALONE = 0.5
 """Share of objects in question without others above which the rest does not speak for them."""
@@ -83,29 +88,24 @@ class Share:
 
 
 @dataclass(frozen=True, slots=True)
-class ObjectComparison:
-    """Objects in question against others.
+class ShareComparison:
+    """Two shares of objects that were missed, and what can be said of their difference.
 
     Attributes:
         about: What is compared, such as "role parkedCar".
-        share: What is missed of the objects in question to which others are alike; of all of them where none is.
-        other: What is missed of those others, spread as the objects in question are, and corrected for what distances
-            still differ.
+        share: What is missed of the objects in question.
+        other: The share that it is set beside.
         difference: The first rate less the second.
         interval: That of the difference.
-        p_value: How probable as much is by chance, were both groups missed alike; nan where there is no verdict.
+        p_value: How probable as much is by chance, were both missed alike; nan where it cannot be tested.
         recordings: Clusters with an object in question that is compared.
         effective: Number of equally large clusters that would tell as much, of the group that has fewer.
-        asked: How many objects are in question.
-        alone: Share of them to which no other is alike.
         missing: What is missing for a verdict, in words; empty where there is one.
-        places: How many of the objects in question are set beside others of each of `PLACES`.
         margin: What is missed more often by less than this counts as no worse.
         unit: What clusters are, such as "recording".
         more: How many clusters more of this kind would tell a difference of ten points with 80 % power; None where
             nothing says how they differ.
         p_corrected: The same p-value, corrected for all tests of the evaluation.
-        uncounted: How many more objects would be in question, but for the rules of the benchmark.
     """
 
     about: str
@@ -116,19 +116,15 @@ class ObjectComparison:
     p_value: float
     recordings: int
     effective: float
-    asked: int = 0
-    alone: float = 0.0
     missing: tuple[str, ...] = ()
-    places: tuple[int, ...] = (0,) * len(PLACES)
     margin: float = MARGIN
     unit: str = "recording"
     more: int | None = None
     p_corrected: float = math.nan
-    uncounted: int = 0
 
     @property
     def says(self) -> Says:
-        """What the recordings say of the objects in question."""
+        """The verdict of the recordings on the objects in question."""
         p_value = self.p_value if math.isnan(self.p_corrected) else self.p_corrected
         if self.missing:
             return "too little"
@@ -138,7 +134,7 @@ class ObjectComparison:
 
     @property
     def because(self) -> str:
-        """Why it says too little; "" where it does not."""
+        """Why there is no verdict; "" where there is one."""
         if self.says != "too little":
             return ""
         low, high = (100 * end for end in self.interval)
@@ -148,15 +144,108 @@ class ObjectComparison:
         units = f"{self.more:,} more {self.unit}{'s' if self.more != 1 else ''} of this kind"
         return f"{told}; about {units} would tell a difference of {100 * _TOLD:g} points ({100 * _POWER:g} % power)"
 
+    def conclude(self, whom: str) -> str:
+        """The end of a sentence: what chance can do, and what is said.
+
+        Args:
+            whom: Whom the objects in question are set beside.
+        """
+        text = ""
+        if not math.isnan(self.p_value):
+            text += f"; {p_text(self.p_value)}"
+            if not math.isnan(self.p_corrected) and self.p_corrected != self.p_value:
+                text += f" (corrected {p_text(self.p_corrected)})"
+        text += f" over {self.recordings} {self.unit}{'s' if self.recordings != 1 else ''}"
+        told = {
+            "worse": f"worse than {whom}",
+            "better": f"better than {whom}",
+            "no worse": f"no worse than {whom}, to {100 * self.margin:g} points",
+            "too little": f"too little to tell: {self.because}",
+        }
+        return f"{text}: {told[self.says]}"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Groups:
+    """Who is set beside whom, by numbers of objects.
+
+    Attributes:
+        own: Objects in question that are compared, shape (n,).
+        others: Those that they are set beside, shape (m,).
+        weight: How much each other counts, 1 in all, shape (m,).
+    """
+
+    own: Numbers
+    others: Numbers
+    weight: Reals
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectComparison(ShareComparison):
+    """Objects in question against others.
+
+    `share` is what is missed of the objects in question to which others are alike, or of all of them where none is;
+    `other` what is missed of those others, spread as the objects in question are, and corrected for what distances
+    still differ.
+
+    Attributes:
+        asked: How many objects are in question.
+        alone: Share of them to which no other is alike.
+        places: How many of the objects in question are set beside others of each of `PLACES`.
+        uncounted: How many more objects would be in question, but for the rules of the benchmark.
+        groups: Who is set beside whom; None where nobody is.
+    """
+
+    asked: int = 0
+    alone: float = 0.0
+    places: tuple[int, ...] = (0,) * len(PLACES)
+    uncounted: int = 0
+    groups: Groups | None = field(default=None, compare=False, repr=False)
+
     @property
     def beside(self) -> str:
-        """Whom the objects in question are set beside, in words."""
+        """Where the compared objects were found, in words."""
+        without = self.asked - sum(self.places)
+        return f"{self.about}: {', '.join([*self._places(), *([f'{without:,} without others'] if without else [])])}"
+
+    def _places(self) -> list[str]:
         places = ("of the same frame", "of the same recording", f"of the same {self.unit}", "elsewhere")
-        told = [
+        return [
             f"{number:,} beside others {place}" for number, place in zip(self.places, places, strict=True) if number
         ]
+
+    def finding(self, undecided: int) -> str:
+        """What was found, with what certainty, against which controls, and what was not looked at, in one sentence.
+
+        Args:
+            undecided: Frames of which nobody knows whether they match.
+        """
+        if math.isnan(self.share.rate):
+            return self.sentence
+        whom = "others that are alike"
+        points = f"{100 * abs(self.difference):.0f} points"
+        told = {
+            "worse": f"missed {points} more often than {whom}",
+            "better": f"missed {points} less often than {whom}",
+            "no worse": f"missed no more often than {whom}, to {100 * self.margin:g} points",
+            "too little": f"whether they are missed more often than {whom} cannot be told: {self.because}",
+        }[self.says]
+        certainty: list[str] = []
+        if not math.isnan(self.interval[0]):
+            low, high = (100 * end for end in self.interval)
+            certainty.append(f"95 % interval {low:+.0f} to {high:+.0f} points")
+        if not math.isnan(self.p_value):
+            certainty.append(p_text(self.p_value if math.isnan(self.p_corrected) else self.p_corrected))
+        certainty.append(f"{self.recordings} {self.unit}{'s' if self.recordings != 1 else ''}")
         without = self.asked - sum(self.places)
-        return f"{self.about}: {', '.join([*told, *([f'{without:,} without others'] if without else [])])}"
+        left = [
+            *([f"{without:,} of {self.asked:,} objects, to which no other is alike"] if without else []),
+            *([f"{self.uncounted:,} that do not count by the rules of the benchmark"] if self.uncounted else []),
+            *([f"{undecided:,} undecided frames"] if undecided else []),
+        ]
+        controls = f"; {', '.join(self._places())}" if sum(self.places) else ""
+        rest = f"not looked at: {', '.join(left)}" if left else "nothing was left out"
+        return f"{self.about}: {told} ({', '.join(certainty)}){controls}; {rest}"
 
     @property
     def sentence(self) -> str:
@@ -167,18 +256,7 @@ class ObjectComparison:
         text = f"missed {percent(self.share)} of {self.about}"
         if not math.isnan(self.other.rate):
             text += f" against {percent(self.other)}"
-        if not math.isnan(self.p_value):
-            text += f"; {p_text(self.p_value)}"
-            if not math.isnan(self.p_corrected) and self.p_corrected != self.p_value:
-                text += f" (corrected {p_text(self.p_corrected)})"
-        text += f" over {self.recordings} {self.unit}{'s' if self.recordings != 1 else ''}"
-        told = {
-            "worse": "worse than others that are alike",
-            "better": "better than others that are alike",
-            "no worse": f"no worse than others that are alike, to {100 * self.margin:g} points",
-            "too little": f"too little to tell: {self.because}",
-        }
-        return f"{text}: {told[self.says]}"
+        return text + self.conclude("others that are alike")
 
 
 def p_text(value: float) -> str:
@@ -235,8 +313,8 @@ def compare(
         recordings = len(np.unique(like.cluster[mine]))
         asked = int(mine.sum())
         return ObjectComparison(
-            about, share, nothing, math.nan, (math.nan, math.nan), math.nan, recordings, 0.0, asked, float(asked > 0),
-            missing, found.places, margin, unit,
+            about, share, nothing, math.nan, (math.nan, math.nan), math.nan, recordings, 0.0, missing, margin, unit,
+            asked=asked, alone=float(asked > 0), places=found.places,
         )  # fmt: skip
     return _compared(about, missed, found, int(mine.sum()), like, rng, margin, unit)
 
@@ -251,7 +329,7 @@ def _compared(
     def by_cluster(values: Reals | Bools) -> Reals:
         return sums_by(like.cluster, values, count)
 
-    number = int(found.compared.sum())
+    number, others = int(found.compared.sum()), np.flatnonzero(found.weight > 0)
     own = found.compared / number
     of, of_others = by_cluster(own), by_cluster(found.weight)
     first, difference = float(own @ lost), float(found.difference @ lost)
@@ -267,12 +345,7 @@ def _compared(
     design = max(least, spread) / independent if independent > 0 else max(1.0, number / effective)
     first_number, second_number = (each / design for each in numbers)
     misses = first * first_number + second * second_number
-    needed = (
-        sum(map(NormalDist().inv_cdf, ((1 + LEVEL) / 2, _POWER))) ** 2 * design * independent / _TOLD**2 * effective,
-        _VERDICT,
-        _OTHERS / second_number * effective,
-        _MISSES / misses * effective if misses else 0.0,
-    )
+    needed = (_OTHERS / second_number * effective, MISSES / misses * effective if misses else 0.0)
     clusters = int((of > 0).sum())
     missing = tuple(_missing(1 - number / asked, effective, second_number, misses, unit))
     p_value = math.nan
@@ -310,22 +383,42 @@ def _compared(
         alone=1 - number / asked,
         missing=missing,
         places=found.places,
+        groups=Groups(np.flatnonzero(found.compared), others, found.weight[others]),
         margin=margin,
         unit=unit,
-        more=max(0, math.ceil((max(needed) / effective - 1) * clusters)) if misses else None,
+        more=clusters_to_tell(design * independent, effective, clusters, *needed) if misses else None,
     )
+
+
+def clusters_to_tell(variance: float, effective: float, clusters: int, *needed: float) -> int:
+    """How many clusters more of this kind would tell a difference of ten points with 80 % power.
+
+    Args:
+        variance: That of the difference as it is.
+        effective: The effective number of clusters.
+        clusters: How many there are.
+        needed: Effective numbers that other reasons ask for.
+    """
+    reach = sum(map(NormalDist().inv_cdf, ((1 + LEVEL) / 2, _POWER)))
+    most = max(reach**2 * variance / _TOLD**2 * effective, _VERDICT, *needed)
+    return max(0, math.ceil((most / effective - 1) * clusters))
+
+
+def few_clusters(effective: float, unit: str) -> Iterator[str]:
+    """What is missing for a verdict where clusters are too few."""
+    if effective < _VERDICT:
+        yield f"it is as much as {effective:.1f} equally large {unit}s would tell, and {_VERDICT:g} are needed"
 
 
 def _missing(alone: float, effective: float, others: float, misses: float, unit: str) -> Iterator[str]:
     """What is missing for a verdict."""
     if alone > _ALONE:
         yield f"{100 * alone:.0f} % have no other object that is alike"
-    if effective < _VERDICT:
-        yield f"it is as much as {effective:.1f} equally large {unit}s would tell, and {_VERDICT:g} are needed"
+    yield from few_clusters(effective, unit)
     if others < _OTHERS:
         yield f"the others tell as much as {others:.1f} independent ones would, and {_OTHERS:g} are needed"
-    elif misses < _MISSES:
-        yield f"{misses:.1f} independent misses, and {_MISSES:g} are needed"
+    elif misses < MISSES:
+        yield f"{misses:.1f} independent misses, and {MISSES:g} are needed"
 
 
 def _alike(found: Controls, like: Likeness) -> Numbers:

@@ -1,4 +1,4 @@
-"""Who is alike: each object in question is set beside others of its class and visibility that are about as far away.
+"""Find controls: for each object in question others of its class and visibility, about as far away.
 
 Others are sought in the same frame first, then in the same recording, then in the same cluster of recordings, and at
 last anywhere under the same parameters: what a frame or a recording has of its own is then in both groups. Distance
@@ -107,7 +107,7 @@ class _Line:
 
 
 def find_controls(mine: Bools, others: Bools, like: Likeness) -> Controls:
-    """Find who is alike.
+    """Find the controls of each object in question.
 
     Args:
         mine: The objects in question, shape (n,).

@@ -1,4 +1,4 @@
-"""How typical labels are of a program: the density with which it would generate what they observe.
+"""How typical labels are of a program: the density with which it generates what they observe.
 
 The density of a label is the product over groups of jointly dependent features (given the label's values of other
 features, as in algorithm 1 of the query paper). In a group, variables in which its features are affine are solved for;
@@ -63,7 +63,7 @@ _Draw = Callable[[Leaf, tuple[Data, ...]], Data]
 
 
 class GroupValues(NamedTuple):
-    """What a group says of labels.
+    """The densities of labels in a group.
 
     Attributes:
         log, error: Logarithms of the densities of the features and their standard errors, shape (labels,); -inf outside
@@ -85,7 +85,7 @@ class GroupDensity:
 
     Attributes:
         group: The group, over the scenario as it is written.
-        draws: Of hidden variables.
+        draws: The draws of hidden variables.
         fixed: Features without any random variable.
         reason: What could not be computed last.
     """
@@ -115,18 +115,18 @@ class GroupDensity:
 
     @property
     def trivial(self) -> bool:
-        """Whether the group counts nothing."""
+        """Whether the group has no features to compare: its density is 1."""
         return not self._continuous and not self._finite
 
     def finite_values(self, label: Observed) -> Iterator[Value]:
-        """What a label observes of the features that hang on finite choices alone."""
+        """The label's values of the features that depend on finite choices alone."""
         return (label[each.object, each.property] for each in self._finite)
 
     def values(self, labels: Sequence[Observed]) -> GroupValues:
-        """Densities of labels, of which there is one at least.
+        """Work out the densities of some labels, at least one.
 
         Raises:
-            UncomputedError: There is no density, or none that can be computed.
+            UncomputedError: There is no density, or it cannot be computed.
         """
         outcomes = self._outcomes()
         if outcomes is not None:
@@ -135,7 +135,7 @@ class GroupDensity:
         return GroupValues(*map(np.concatenate, zip(*parts, strict=True)))
 
     def _outcomes(self) -> Sequence[tuple[float, GroupDensity]] | None:
-        """The group given each outcome of the choices that decide which variables there are, with its probability.
+        """Split the group by the choices that decide which variables there are: each outcome with its probability.
 
         Raises:
             UncomputedError: There are too many, or under one of them a feature has no density.
@@ -161,7 +161,7 @@ class GroupDensity:
         return found
 
     def _given(self, given: Mapping[Identity, Value]) -> GroupDensity:
-        """The group where choices have come out so; what was of finite choices is still compared."""
+        """The group under one outcome of these choices; features of finite choices are still compared."""
         memo: dict[int, Node] = {}
         put = {
             id(each): replace(each, expression=condition(each.expression, {}, given, memo))
@@ -214,7 +214,7 @@ class GroupDensity:
     def _weights(
         self, columns: ObservedColumns, dimension: int, turns: tuple[float, ...]
     ) -> tuple[Array, Sequence[Array], Array]:
-        """What is averaged, for headings that are whole turns off, the solved variables, and their determinant.
+        """The terms of the mean, with headings off by whole turns; the solved variables; their determinant.
 
         Shapes are broadcastable to (labels, draws).
         """
@@ -248,7 +248,7 @@ class GroupDensity:
         return found
 
     def _chances(self, columns: ObservedColumns, solved: Mapping[Identity, Data]) -> Array:
-        """Densities of the solved variables at their values, where all that must hold does."""
+        """The density of the solved variables at their values; 0 where a requirement fails."""
         density: list[Array] = [np.ones((1, 1))]
         whole = {leaf.identity: self._whole(leaf) for leaf in self._pivots}
 
@@ -283,7 +283,7 @@ class GroupDensity:
         return weight
 
     def _whole(self, leaf: Leaf) -> tuple[tuple[float, Node], ...] | None:
-        """The regions that a point may be of, with their probabilities, where nothing else hangs on the choice."""
+        """The regions that a point is drawn from, with their probabilities, if nothing else depends on the choice."""
         if not isinstance(leaf, PointIn) or not isinstance(leaf.region, Select):
             return None
         choice, index = leaf.region, leaf.region.index
@@ -297,7 +297,7 @@ class GroupDensity:
         return tuple((weight / total, option) for weight, option in zip(index.weights, choice.options, strict=True))
 
     def _affine(self, columns: ObservedColumns, dimension: int) -> tuple[list[Array], list[list[Array]]]:
-        """The features where all solved variables are 0, and by how much they change with each."""
+        """The features as affine functions: their values where all solved variables are 0, and the change with each."""
         base = self._at(columns, [np.zeros((1, 1))] * dimension)
         matrix: list[list[Array]] = []
         for place in range(dimension):
@@ -309,7 +309,7 @@ class GroupDensity:
     def _at(
         self, columns: ObservedColumns, values: Sequence[Array], pivots: Sequence[Leaf] | None = None
     ) -> list[Array]:
-        """The coordinates of the features where solved variables have some values."""
+        """The coordinates of the features at some values of the solved variables."""
         known = self._assign(values) if pivots is None else _assigned(pivots, values)
 
         def draw(leaf: Leaf, args: tuple[Data, ...]) -> Data:
@@ -319,7 +319,7 @@ class GroupDensity:
         return _coordinates(evaluate_arrays(_without_regions(roots, known), draw, columns.values, self.draws.count))
 
     def _choose(self, columns: ObservedColumns) -> tuple[Leaf, ...]:
-        """Variables to solve for: as many as the features have coordinates, which must be affine in them."""
+        """Choose variables to solve for, one for each coordinate of the features, which are affine in them."""
         sizes = [2 if columns.is_pair(each) else 1 for each in self._continuous]
         wanted = sum(sizes)
         candidates = [leaf for leaf in leaves(*self._roots_of_continuous()) if _is_continuous(leaf)]
@@ -339,7 +339,7 @@ class GroupDensity:
         return tuple(self._roots[id(each)] for each in self._continuous)
 
     def _is_affine(self, columns: ObservedColumns, chosen: Sequence[Leaf], wanted: int) -> bool:
-        """Whether the features are affine in some variables, of which they tell the values."""
+        """Whether the features are affine in some variables and determine them."""
         if degree(self._roots_of_continuous(), {leaf.identity for leaf in chosen}, _of_draw) > 1:
             return False
         base = self._at(columns, [np.zeros((1, 1))] * wanted, chosen)
@@ -352,7 +352,7 @@ class GroupDensity:
 
 
 def _of_draw(node: Node, own: Sequence[int]) -> int:
-    """The degree of a draw, which for other parameters is moved and stretched, and of regions that it is of."""
+    """The degree of a draw: other parameters move and stretch it, or its region."""
     match node:
         case Range() | Normal():
             return max(own)
@@ -378,7 +378,7 @@ def _assigned(pivots: Sequence[Leaf], values: Sequence[Array]) -> dict[Identity,
 
 
 def _turned(node: Node) -> Node:
-    """A heading without what only brings it into one turn, which headings are compared without."""
+    """Leave out the wrapping of a heading into one turn, as headings are compared modulo a turn."""
     if isinstance(node, Arithmetic):
         if node.op is ArithmeticOp.WRAP:
             return _turned(node.args[0])
@@ -388,7 +388,7 @@ def _turned(node: Node) -> Node:
 
 
 def _without_regions(roots: tuple[Node, ...], known: Mapping[Identity, Data]) -> tuple[Node, ...]:
-    """The roots with points whose value is known no longer over their regions, which need not be computed."""
+    """Cut the regions off points whose value is known, so that the regions need not be computed."""
     memo: dict[int, Node] = {}
     for node in postorder(roots):
         if isinstance(node, PointIn) and node.identity in known:
@@ -400,7 +400,7 @@ def _without_regions(roots: tuple[Node, ...], known: Mapping[Identity, Data]) ->
 
 
 def _once(draw: _Draw, mixed: Sequence[Leaf], solved: Mapping[Identity, Data]) -> _Draw:
-    """As `draw`, but for points whose density has been counted already."""
+    """Draw as `draw` does, but give points of `mixed` their solved values: their density is counted already."""
     done = {leaf.identity for leaf in mixed}
 
     def drawn(leaf: Leaf, args: tuple[Data, ...]) -> Data:
@@ -429,7 +429,7 @@ def _coordinates(values: Sequence[Data]) -> list[Array]:
 
 
 def _solve(matrix: Sequence[Sequence[Array]], rest: Sequence[Array]) -> tuple[list[Array], Array]:
-    """The solutions of linear equations, and the sizes of their determinants, element by element.
+    """Solve linear equations, element by element: the solutions, and the absolute determinants.
 
     Args:
         matrix: For each variable the coefficient in each equation.

@@ -1,4 +1,4 @@
-"""Predictions joined with the labels of a dataset: what counts by the rules of the benchmark, and what was found."""
+"""Join predictions with the labels of a dataset: what counts by the benchmark's rules, and what was found."""
 
 from __future__ import annotations
 
@@ -84,10 +84,10 @@ class Detection:
         prediction_class: The same for predictions, shape (predictions,).
         frame: Number of the dataset's frame of each prediction.
         owner: For each centre distance the label object of each prediction, -1 without.
-        errors: Of the predictions that are label objects within `ERRORS_AT_M`, nan for others; shape (predictions, 5).
+        errors: Those of predictions that are label objects within `ERRORS_AT_M`, else nan; shape (predictions, 5).
         flat: Whether distances are those in the plane although the benchmark takes those in space, since the dataset
             does not know all heights.
-        distance: Of each label object from the ego, metres.
+        distance: How far each label object is from the ego, metres.
         score: For each centre distance the score with which each label object was found, -inf where it was not.
     """
 

@@ -1,4 +1,4 @@
-"""A model's detections judged on the frames of a scenario: the whole of it, from files to figures.
+"""Judge a model's detections on the frames of a scenario, from files to figures.
 
 The query paper's figure 1: a model failed on a scenario in simulation; does it fail on the real frames that match?
 """
@@ -6,8 +6,9 @@ The query paper's figure 1: a model failed on a scenario in simulation; does it 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 from pathlib import Path
 from typing import Any, TypeAlias, cast, get_args
 
@@ -16,15 +17,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.errors import DataError, Diagnostic
+from scenicq.evaluate.balance import Balance, balance
 from scenicq.evaluate.benchmark import BenchmarkFigures, benchmark_figures
 from scenicq.evaluate.classes import ClassFigures, class_figures
-from scenicq.evaluate.clusters import Clusters, find_clusters, parameters_of
-from scenicq.evaluate.comparison import MARGIN, ObjectComparison, compare
+from scenicq.evaluate.clusters import find_clusters, parameters_of
+from scenicq.evaluate.comparison import MARGIN, ObjectComparison, ShareComparison, compare
 from scenicq.evaluate.controls import Likeness, number_of
 from scenicq.evaluate.detection import DISTANCES, Detection, FoundWithin, Missing, detect
 from scenicq.evaluate.matched import Matched, read_matched
+from scenicq.evaluate.paired_models import PairedComparison, compare_pair
+from scenicq.evaluate.paired_runs import pair_runs
 from scenicq.evaluate.resampling import holm, resamples
-from scenicq.evaluate.simulation import Simulated, read_simulated, verdict
+from scenicq.evaluate.simulation import Simulated, SimulatedRuns, read_simulated, verdict
 from scenicq.evaluate.slices import Slice, slices
 from scenicq.evaluate.weighting import Weighted, weigh
 from scenicq.importers.prediction_checks import find_doubts
@@ -41,7 +45,15 @@ from scenicq.query.execution.skipped_frames import summarize
 from scenicq.store.dataset import Dataset
 from scenicq.store.remote_path import AnyPath, RemotePath, any_path
 
-__all__ = ["Evaluation", "ScenarioEvaluation", "WorstFrame", "evaluate"]
+__all__ = [
+    "Evaluation",
+    "ModelsEvaluation",
+    "ScenarioEvaluation",
+    "WorstFrame",
+    "evaluate",
+    "evaluate_models",
+    "name_models",
+]
 
 Bools = NDArray[np.bool_]
 Reals = NDArray[np.float64]
@@ -77,7 +89,7 @@ class ScenarioEvaluation:
     """The figures of one scenario.
 
     Attributes:
-        name: Of the scenario.
+        name: The scenario's name.
         matching, other, undecided: Numbers of frames: of the last nobody knows whether they match.
         roles: How often the objects of each role are missed, against others of their classes that are alike in
             distance and visibility.
@@ -86,6 +98,7 @@ class ScenarioEvaluation:
             the program spreads its scenes; empty where the results are not ranked.
         classes: Figures of each class, on frames that match and on the others.
         slices: Shares missed by what objects and frames are like.
+        balances: How alike those who are compared are, for each of `headline` in which anybody is.
         worst: Frames that match, the worst first.
         simulated: The scenario in simulation; None without.
         missed: Whether each label object was missed, for pictures.
@@ -103,6 +116,7 @@ class ScenarioEvaluation:
     weighted: tuple[Weighted, ...]
     classes: tuple[ClassFigures, ...]
     slices: tuple[Slice, ...]
+    balances: tuple[Balance, ...]
     worst: tuple[WorstFrame, ...]
     simulated: Simulated | None
     missed: Bools
@@ -142,6 +156,22 @@ class Evaluation:
     benchmark: BenchmarkFigures | None
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class ModelsEvaluation:
+    """Several models judged on the same frames.
+
+    Attributes:
+        models: The evaluation of each model, by its name.
+        pairs: Each model beside each that comes before it, on the objects that count for both: those of each role, all
+            of the frames that match, and all of the other frames.
+        warnings: What the user should know.
+    """
+
+    models: Mapping[str, Evaluation]
+    pairs: tuple[PairedComparison, ...]
+    warnings: tuple[Diagnostic, ...]
+
+
 def evaluate(
     results: Results | Mapping[str, Results],
     dataset: Dataset,
@@ -158,7 +188,7 @@ def evaluate(
     """Judge a model's detections on the frames that match, against the other frames.
 
     Args:
-        results: Of one scenario, or of several by their names.
+        results: Those of one scenario, or of several by their names.
         dataset: The dataset that the results are of.
         predictions: What the model has detected, or a file of it.
         distance_m: Centre distance within which an object counts as found: 0.5, 1, 2 or 4; for some classes another
@@ -175,57 +205,114 @@ def evaluate(
         DataError: A file cannot be read or does not fit the others; option-invalid for another distance, or a score
             that is no number.
     """
+    found = evaluate_models(
+        results, dataset, {"": predictions}, distance_m=distance_m, least_score=least_score, missing=missing,
+        simulated=simulated, cluster=cluster, margin=margin, seed=seed,
+    )  # fmt: skip
+    return found.models[""]
+
+
+def evaluate_models(
+    results: Results | Mapping[str, Results],
+    dataset: Dataset,
+    predictions: Mapping[str, Predictions | Path | str],
+    *,
+    distance_m: float | str | Mapping[str, float] = 2.0,
+    least_score: float | None = None,
+    missing: Missing = "error",
+    simulated: Path | str | None = None,
+    cluster: str | None = None,
+    margin: float = MARGIN,
+    seed: int = 0,
+) -> ModelsEvaluation:
+    """Judge several models on the same frames, each by itself and each beside those before it.
+
+    Args and errors are those of `evaluate`, but for `predictions`, which are by the names of the models, and
+    `simulated`, which is of one model. All tests are corrected together.
+    """
     within = FoundWithin.of(read_option("distance_m", DISTANCES, distance_m))
     seed, missing = read_option("seed", SEED, seed), read_option("missing", OneOf(get_args(Missing)), missing)
     least_score = None if least_score is None else read_option("least_score", SCORE, least_score)
     margin = read_option("margin", MARGIN_OPTION, margin)
+    if simulated is not None and len(predictions) > 1:
+        message = "simulated runs are those of one model, and there are several"
+        raise DataError(Diagnostic("option-invalid", message, hints=("evaluate that model by itself",)))
     runs = None if simulated is None else read_simulated(Path(simulated))
     named: Mapping[str, Results] = (
         cast("Mapping[str, Results]", results) if isinstance(results, Mapping) else {_name_of(results): results}
     )
-    detected = predictions if isinstance(predictions, Predictions) else read_predictions(Path(predictions))
-    doubts = [
-        Diagnostic("predictions-doubtful", f"{detected.name}: {each}", severity="warning")
-        for each in find_doubts(detected)
-    ]
-    detection = detect(dataset, detected, missing)
-    # a file's predictions are not kept here: what is evaluated of them is a copy
-    del detected
-    if strange := [name for name in within.of_class if name not in detection.classes]:
-        hint = f"there are {', '.join(detection.classes)}"
-        raise DataError(
-            Diagnostic("option-invalid", f"a distance of `{strange[0]}`, which is no class here", hints=(hint,))
-        )
-    if least_score is None:
-        least_score = float(detection.predictions.score.min(initial=0.0))
-    rng = np.random.default_rng(seed)
-    judge = _Judge(detection, within, least_score, rng, margin, find_clusters(detection.frames, cluster))
-    found: list[ScenarioEvaluation] = []
+    doubts: list[Diagnostic] = []
+    judges = {
+        name: _Judge(_detect(each, dataset, missing, within, doubts), within, least_score, seed, margin, cluster)
+        for name, each in predictions.items()
+    }
+    any_judge = next(iter(judges.values()))
+    matched: list[Matched] = []
     for name, each in named.items():
         records = RecordStream(_records(each, doubts))
         own = _own(name, records, dataset, doubts)
-        found.append(judge.scenario(
-            read_matched(name, own, detection.frames, detection.objects, lambda records=records: records.completeness)
-        ))  # fmt: skip
+        labels = any_judge.detection
+        matched.append(
+            read_matched(name, own, labels.frames, labels.objects, lambda records=records: records.completeness)
+        )
         doubts += _doubt(name, each, records.completeness)
-    found = _corrected(found)
+    found = [each.scenario(one) for each in judges.values() for one in matched]
+    pairs = list(_pairs(judges, matched))
+    found, pairs = _corrected(found, pairs)
     if runs is not None:
         missing_runs = [each.name for each in found if each.name not in runs]
         if missing_runs:
             message = f"{simulated} has no run of {', '.join(missing_runs)}"
             hint = f"it has {', '.join(sorted(runs))}; a scenario is called after its file of results"
             raise DataError(Diagnostic("file-invalid", message, hints=(hint,)))
-        found = [replace(each, simulated=verdict(runs[each.name], _decisive(each))) for each in found]
-    return Evaluation(
-        name_origin(dataset),
-        detection.predictions.name,
-        within,
-        least_score,
-        tuple(found),
-        (*doubts, *_warnings(found, detection)),
-        detection,
-        benchmark_figures(detection),
-    )
+        found = [any_judge.beside_runs(each, runs[each.name], str(simulated)) for each in found]
+    models: dict[str, Evaluation] = {}
+    warnings = list(doubts)
+    for number, (name, judge) in enumerate(judges.items()):
+        own = tuple(found[number * len(matched) : (number + 1) * len(matched)])
+        told = [*_warnings(own, judge.detection)]
+        if name:
+            told = [replace(each, message=f"{name}: {each.message}") for each in told]
+        warnings += told
+        models[name] = Evaluation(
+            name_origin(dataset), judge.detection.predictions.name, within, judge.least, own, (*doubts, *told),
+            judge.detection, benchmark_figures(judge.detection),
+        )  # fmt: skip
+    return ModelsEvaluation(models, tuple(pairs), tuple(warnings))
+
+
+def name_models(paths: Sequence[Path]) -> tuple[str, ...]:
+    """Name models after the files of their predictions, with as many folders as it takes to tell them apart.
+
+    Raises:
+        DataError: option-invalid: no file is named, or one twice.
+    """
+    if not paths:
+        raise DataError(Diagnostic("option-invalid", "no predictions are named"))
+    for parts in range(1, max(len(each.parts) for each in paths) + 1):
+        names = tuple("/".join(each.parts[-parts:]) for each in paths)
+        if len(set(names)) == len(names):
+            return names
+    raise DataError(Diagnostic("option-invalid", "the predictions of two models are the same file"))
+
+
+def _detect(
+    predictions: Predictions | Path | str, dataset: Dataset, missing: Missing, within: FoundWithin,
+    doubts: list[Diagnostic],
+) -> Detection:  # fmt: skip
+    """What a model has detected; a file's predictions are not kept beside it."""
+    detected = predictions if isinstance(predictions, Predictions) else read_predictions(Path(predictions))
+    doubts += [
+        Diagnostic("predictions-doubtful", f"{detected.name}: {each}", severity="warning")
+        for each in find_doubts(detected)
+    ]
+    detection = detect(dataset, detected, missing)
+    if strange := [name for name in within.of_class if name not in detection.classes]:
+        hint = f"there are {', '.join(detection.classes)}"
+        raise DataError(
+            Diagnostic("option-invalid", f"a distance of `{strange[0]}`, which is no class here", hints=(hint,))
+        )
+    return detection
 
 
 def _name_of(results: Results) -> str:
@@ -235,7 +322,7 @@ def _name_of(results: Results) -> str:
 
 
 def _doubt(name: str, results: Results, said: Completeness) -> Iterator[Diagnostic]:
-    """A warning where results do not say of every frame whether it matches."""
+    """Warn where results do not say of every frame whether it matches."""
     if said.summary is None and not isinstance(results, Path | RemotePath | str):
         return  # who hands them over knows
     told = "other frames count as those that do not match"
@@ -271,7 +358,7 @@ def _records(results: Results, doubts: list[Diagnostic]) -> Iterator[Record | Su
 
 
 def _own(name: str, records: Iterable[Record], dataset: Dataset, doubts: list[Diagnostic]) -> Iterator[Record]:
-    """The records, once it is sure that they do not name another dataset; another version of it is a doubt."""
+    """Read the records, and refuse those of another dataset; another version of the dataset is a warning."""
     mine = name_origin(dataset)
     seen: set[str] = set()
     for each in records:
@@ -288,15 +375,26 @@ def _decisive(scenario: ScenarioEvaluation) -> ObjectComparison:
     return max(scenario.headline, key=lambda each: -1.0 if math.isnan(each.difference) else each.difference)
 
 
-def _corrected(found: list[ScenarioEvaluation]) -> list[ScenarioEvaluation]:
-    """With the p-values of all rows of all scenarios corrected together."""
+def _pairs(judges: Mapping[str, _Judge], matched: Iterable[Matched]) -> Iterator[PairedComparison]:
+    """Each model beside each that comes before it."""
+    for one in matched:
+        for (baseline, before), (model, judge) in combinations(judges.items(), 2):
+            for each in judge.beside(before, one):
+                yield replace(each, scenario=one.name, model=model, baseline=baseline)
+
+
+def _corrected(
+    found: list[ScenarioEvaluation], pairs: list[PairedComparison]
+) -> tuple[list[ScenarioEvaluation], list[PairedComparison]]:
+    """Correct the p-values of all rows of all scenarios and models together."""
     rows = [[*one.roles, one.all_objects] for one in found]
-    corrected = iter(holm(np.array([each.p_value for some in rows for each in some])).tolist())
+    tested: list[ShareComparison] = [*(each for some in rows for each in some), *pairs]
+    corrected = iter(holm(np.array([each.p_value for each in tested])).tolist())
     done: list[ScenarioEvaluation] = []
     for one, some in zip(found, rows, strict=True):
         *roles, of_all = (replace(each, p_corrected=next(corrected)) for each in some)
         done.append(replace(one, roles=tuple(roles), all_objects=of_all))
-    return done
+    return done, [replace(each, p_corrected=next(corrected)) for each in pairs]
 
 
 def _warnings(found: Iterable[ScenarioEvaluation], detection: Detection) -> Iterator[Diagnostic]:
@@ -340,16 +438,19 @@ class _Judge:
     """Labels and predictions, ready to be divided by scenarios."""
 
     def __init__(
-        self, detection: Detection, within: FoundWithin, least: float, rng: np.random.Generator, margin: float,
-        clusters: Clusters,
+        self, detection: Detection, within: FoundWithin, least: float | None, seed: int, margin: float,
+        cluster: str | None,
     ) -> None:  # fmt: skip
-        self._detection, self._within, self._least, self._rng = detection, within, least, rng
-        self._margin, self._clusters = margin, clusters
+        self.detection, self._within, self._margin = detection, within, margin
+        self.least = float(detection.predictions.score.min(initial=0.0)) if least is None else least
+        # each model's figures are those that it has by itself
+        self._rng = np.random.default_rng(seed)
+        self._clusters = clusters = find_clusters(detection.frames, cluster)
         objects = detection.objects
-        self._counted = detection.object_class >= 0
+        self.counted = detection.object_class >= 0
         score = detection.found_score(within)
-        self._missed = self._counted & ((score < least) | np.isneginf(score))
-        self._weights = resamples(clusters.count, rng)
+        self.missed = self.counted & ((score < self.least) | np.isneginf(score))
+        self._weights = resamples(clusters.count, self._rng)
         self._parameters = parameters_of(detection.frames, clusters)
         category = np.maximum(detection.object_class, 0).astype(np.int64)
         frame = objects.frame.astype(np.int64)
@@ -365,22 +466,19 @@ class _Judge:
 
     def _combined(self, names: Iterable[str]) -> NDArray[np.int64]:
         """The number of each frame's combination of parameters."""
-        whole = np.zeros(len(self._detection.frames.names), dtype=np.int64)
+        whole = np.zeros(len(self.detection.frames.names), dtype=np.int64)
         return number_of((whole, *(self._parameters[name][1] for name in names)))
 
     def scenario(self, matched: Matched) -> ScenarioEvaluation:
         """The figures of one scenario."""
-        detection = self._detection
-        matching = matched.matching & detection.covered
-        other = matched.decided & ~matched.matching & detection.covered
+        detection = self.detection
         frame = detection.objects.frame
-        here, there = self._counted & matching[frame], self._counted & other[frame]
-        asked: list[tuple[str, Bools, int]] = []
-        for role in matched.roles:
-            mine = np.zeros(len(frame), dtype=np.bool_)
-            mine[role.objects] = True
-            uncounted = int((mine & matching[frame] & ~self._counted).sum())
-            asked.append((f"role {role.name}", mine & here, uncounted))
+        matching, other = self.frames(matched)
+        here, there = self.counted & matching[frame], self.counted & other[frame]
+        asked = [
+            (about, mine & here, int((mine & matching[frame] & ~self.counted).sum()))
+            for about, mine in self._roles(matched)
+        ]
         in_roles = np.logical_or.reduce([mine for _, mine, _ in asked]) if asked else here
         # who plays any role is no control of another
         free = there | (here & matched.free[frame] & ~in_roles) if asked else there
@@ -389,6 +487,7 @@ class _Judge:
         )
         of_all, coincident = self._of_all(here, there)
         others = free & self._of_classes(in_roles)
+        balances = (balance(each, detection, self._parameters) for each in roles or (of_all,))
         return ScenarioEvaluation(
             name=matched.name,
             matching=int(matching.sum()),
@@ -400,18 +499,71 @@ class _Judge:
             classes=tuple(
                 figures
                 for group, frames in (("matching", matching), ("other", other))
-                for figures in class_figures(
-                    detection, group, frames, self._clusters.number, self._weights, self._least
-                )
+                for figures in class_figures(detection, group, frames, self._clusters.number, self._weights, self.least)
             ),
-            slices=slices(detection, matched, self._missed, in_roles, others, self._like.cluster),
+            slices=slices(detection, matched, self.missed, in_roles, others, self._like.cluster),
+            balances=tuple(each for each in balances if each is not None),
             worst=tuple(self._worst(matching, in_roles)),
             simulated=None,
-            missed=self._missed,
+            missed=self.missed,
             mine=in_roles,
             coincident=coincident,
             one_each=not matched.every,
         )
+
+    def beside(self, before: _Judge, matched: Matched) -> Iterator[PairedComparison]:
+        """What this model misses beside another one, of the objects that count for both."""
+        frame = self.detection.objects.frame
+        (here, there), (here_too, there_too) = self.frames(matched), before.frames(matched)
+        matching, other = (here & here_too)[frame], (there & there_too)[frame]
+        roles = [(about, mine & matching) for about, mine in self._roles(matched)]
+        groups = [*roles, ("all objects", matching), ("objects of the other frames", other)]
+        for about, mine in groups:
+            both = mine & self.counted & before.counted
+            yield compare_pair(
+                about, self.missed, before.missed, both, self._like.cluster, self._rng, margin=self._margin,
+                unit=self._clusters.unit,
+            )  # fmt: skip
+
+    def beside_runs(self, scenario: ScenarioEvaluation, runs: SimulatedRuns, name: str) -> ScenarioEvaluation:
+        """A scenario beside its simulated runs, pair by pair where they name recordings.
+
+        Raises:
+            DataError: file-invalid: a run rebuilds what the dataset does not have.
+        """
+        real = _decisive(scenario)
+        frames, clusters = self.detection.frames, self._clusters.number
+        of_scene = {name: int(clusters[number]) for name, number in frames.numbers.items()}
+        for number, recording in zip(clusters.tolist(), frames.recording.tolist(), strict=True):
+            of_scene[frames.recordings[recording]] = number
+        if strange := [each for each in runs.rebuilt if each and each not in of_scene]:
+            message = f"{name}: a run rebuilds `{strange[0]}`, which is no recording and no frame of the dataset"
+            raise DataError(Diagnostic("file-invalid", message))
+        paired = None
+        if real.groups is not None and any(runs.rebuilt):
+            # a run that rebuilds nothing is of a scene of its own
+            scenes = [each or f"\0{number}" for number, each in enumerate(runs.rebuilt)]
+            paired = pair_runs(
+                runs.failed,
+                np.array([of_scene.get(each, -1) for each in runs.rebuilt], dtype=np.int64),
+                np.unique(scenes, return_inverse=True)[1].astype(np.int64),
+                self.missed[real.groups.own],
+                self._like.cluster[real.groups.own],
+                self._clusters.unit,
+            )
+        return replace(scenario, simulated=verdict(runs, real, paired))
+
+    def frames(self, matched: Matched) -> tuple[Bools, Bools]:
+        """The frames that match, and those that do not, of those that predictions speak of."""
+        covered = self.detection.covered
+        return matched.matching & covered, matched.decided & ~matched.matching & covered
+
+    def _roles(self, matched: Matched) -> Iterator[tuple[str, Bools]]:
+        """Who plays each role."""
+        for role in matched.roles:
+            mine = np.zeros(len(self.detection.objects.frame), dtype=np.bool_)
+            mine[role.objects] = True
+            yield f"role {role.name}", mine
 
     def _of_role(self, about: str, mine: Bools, free: Bools) -> ObjectComparison:
         others = free & self._of_classes(mine)
@@ -441,25 +593,29 @@ class _Judge:
         if log_weight is not None:
             for about, mine in asked:
                 numbers = np.flatnonzero(mine)
-                of_frame = log_weight[self._detection.objects.frame[numbers]]
-                yield weigh(about, self._missed[numbers], of_frame, self._like.cluster[numbers])
+                of_frame = log_weight[self.detection.objects.frame[numbers]]
+                yield weigh(about, self.missed[numbers], of_frame, self._like.cluster[numbers])
 
     def _of_classes(self, mine: Bools) -> Bools:
         return np.isin(self._like.category, np.unique(self._like.category[mine]))
 
     def _compare(self, about: str, mine: Bools, others: Bools, like: Likeness) -> ObjectComparison:
         used = np.flatnonzero(mine | others)
-        return compare(
-            about, self._missed[used], mine[used], others[used], like.taken(used), self._rng,
+        found = compare(
+            about, self.missed[used], mine[used], others[used], like.taken(used), self._rng,
             margin=self._margin, unit=self._clusters.unit,
         )  # fmt: skip
+        if found.groups is None:
+            return found
+        own, beside = used[found.groups.own], used[found.groups.others]
+        return replace(found, groups=replace(found.groups, own=own, others=beside))
 
     def _worst(self, matching: Bools, mine: Bools) -> Iterator[WorstFrame]:
-        detection = self._detection
+        detection = self.detection
         count = len(matching)
-        lost = np.bincount(detection.objects.frame[mine & self._missed], minlength=count)
+        lost = np.bincount(detection.objects.frame[mine & self.missed], minlength=count)
         of = np.bincount(detection.objects.frame[mine], minlength=count)
-        wrong = detection.is_false(self._within) & (detection.predictions.score >= self._least)
+        wrong = detection.is_false(self._within) & (detection.predictions.score >= self.least)
         false = np.bincount(detection.frame[wrong], minlength=count)
         numbers = np.flatnonzero(matching)
         with np.errstate(invalid="ignore", divide="ignore"):

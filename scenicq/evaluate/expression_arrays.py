@@ -1,4 +1,4 @@
-"""Expressions over many labels and many draws of their random variables at once.
+"""Evaluate expressions over many labels and many draws of their random variables at once.
 
 A number is an array that broadcasts to (labels, draws): what hangs on a label alone has shape (labels, 1), what is
 drawn alike for all labels (1, draws). Undefined numbers are nan.
@@ -25,7 +25,7 @@ _MOST_POINTS = 300_000
 
 
 class UncomputedError(Exception):
-    """What cannot be computed for many draws at once; the message says what."""
+    """Something cannot be computed for many draws at once; the message says what."""
 
 
 def evaluate_arrays(
@@ -34,7 +34,7 @@ def evaluate_arrays(
     observed: Mapping[tuple[int, str], Data],
     draws: int,
 ) -> list[Data]:
-    """The values of expressions; truth values are false where they have none.
+    """Evaluate expressions; a truth value is false where it is undefined.
 
     Where a field allows several headings, each draw has one of them.
 

@@ -1,4 +1,4 @@
-"""Whether predictions lie in the frame of reference that their format says: that of the map, or that of the ego."""
+"""Check that predictions lie in the frame of reference of their format: the map's, or the ego's."""
 
 from __future__ import annotations
 
@@ -42,11 +42,11 @@ def check_fit(name: str, boxes: Centres, owner: Numbers, labels: Centres, poses:
     """Refuse boxes that are hardly ever near a label object, but often would be in the other frame of reference.
 
     Args:
-        name: Of the file.
+        name: The file's name.
         boxes: Predictions on the map, in the order of falling scores.
         owner: The label object of each prediction at the largest centre distance, -1 without.
         labels: The label objects that count.
-        poses: Of the egos.
+        poses: The poses of the egos.
         of_ego: Whether the boxes were taken to lie in the ego's frame.
 
     Raises:

@@ -1,4 +1,4 @@
-"""What a query has found, by frame of the dataset: which frames match, who plays which role, with which values."""
+"""The results of a query by frame of the dataset: which frames match, with which objects and values."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Played:
     """The label objects that play one role.
 
     Attributes:
-        name: Of the role.
+        name: The role's name.
         objects: Their numbers, each once, shape (n,).
     """
 
@@ -43,7 +43,7 @@ class Matched:
     """The frames of a dataset as one query divides them.
 
     Attributes:
-        name: Of the scenario.
+        name: The scenario's name.
         matching: Frames that match, shape (frames,).
         decided: Frames that match or do not; the others are unknown.
         settled: Frames of which nothing is unknown: there are no more correspondences than those that are said.
@@ -67,7 +67,7 @@ class Matched:
 
     @property
     def free(self) -> Bools:
-        """Frames that match in which who is in no role surely can play none, shape (frames,)."""
+        """Frames that match, and whose objects without a role surely can play none, shape (frames,)."""
         return self.matching & self.settled if self.every else np.zeros(len(self.matching), dtype=np.bool_)
 
 
@@ -81,7 +81,7 @@ def read_matched(
     what is unknown.
 
     Args:
-        name: Of the scenario.
+        name: The scenario's name.
         records: Results for frames, or for intervals (whose roles are played by tracks).
         frames: The dataset's.
         objects: Its label objects.

@@ -8,10 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
+from scenicq.errors import Diagnostic
 from scenicq.evaluate.comparison import Share
 from scenicq.evaluate.detection import Detection
-from scenicq.evaluate.evaluation import Evaluation, ScenarioEvaluation, WorstFrame
-from scenicq.evaluate.rows import Table, frame_counts, overview, tables
+from scenicq.evaluate.evaluation import Evaluation, ModelsEvaluation, ScenarioEvaluation, WorstFrame
+from scenicq.evaluate.rows import Table, balance_table, frame_counts, models_table, overview, tables
 from scenicq.geometry.boxes import corners
 from scenicq.geometry.camera import box_corners, box_edges
 from scenicq.report.backdrop import Backdrop
@@ -47,11 +48,13 @@ _SIGNS = (
 )
 
 
-def write_pages(evaluation: Evaluation, dataset: Dataset, folder: AnyPath, sensors: Path | None = None) -> AnyPath:
+def write_pages(
+    evaluation: Evaluation | ModelsEvaluation, dataset: Dataset, folder: AnyPath, sensors: Path | None = None
+) -> AnyPath:
     """Write a page into a folder; an earlier report there is replaced when the new one is complete.
 
     Args:
-        evaluation: What to show.
+        evaluation: What to show, of one model or of several.
         dataset: The labels.
         folder: Where to.
         sensors: The folder that the paths of sensor files start from; only the dataset's own by default.
@@ -65,7 +68,7 @@ def write_pages(evaluation: Evaluation, dataset: Dataset, folder: AnyPath, senso
     with new_report(folder) as work:
         roots = roots_of(dataset, sensors)
         files = SensorFiles(roots, folder, work, can_make_thumbnails(), inside=True, size=_IMAGE)
-        text = _Pages(evaluation, dataset, files).text()
+        text = _text(evaluation, dataset, files)
         (work / "index.html").write_text(text, encoding="utf-8", newline="\n")
     return folder / "index.html"
 
@@ -101,48 +104,100 @@ def _whiskers(share: Share, other: Share | None) -> str:
                    aria_hidden="true")  # fmt: skip
 
 
+def _dots(own: float, others: float) -> str:
+    """Two shares, one over the other: the objects in question, then the others."""
+    unknown = (math.nan, math.nan)
+    return _whiskers(Share(math.nan, math.nan, own, unknown), Share(math.nan, math.nan, others, unknown))
+
+
 def _counted(count: int, what: str, several: str) -> str:
     return f"{count} {what if count == 1 else several}"
 
 
-class _Pages:
-    """A page in the making."""
+_TITLE = "Detections on the frames that match"
 
-    def __init__(self, evaluation: Evaluation, dataset: Dataset, files: SensorFiles) -> None:
+
+def _text(evaluation: Evaluation | ModelsEvaluation, dataset: Dataset, files: SensorFiles) -> str:
+    """The whole page."""
+    if isinstance(evaluation, Evaluation):
+        one = _Model(evaluation, dataset, files)
+        head = element("header", element("h1", _TITLE), *one.origin, _list(evaluation.warnings))
+        return page(_TITLE, [head, element("main", *one.sections())], script=False)
+    links = [
+        element("li", element("a", escape(name), href=f"#{_anchor_of(number)}"))
+        for number, name in enumerate(evaluation.models)
+    ]
+    head = element("header", element("h1", _TITLE), element("ul", *links), _list(evaluation.warnings))
+    graphs = [_whiskers(each.share, each.other) for each in evaluation.pairs]
+    parts = [element("p", element("b", escape(each.sentence))) for each in evaluation.pairs]
+    parts.append(_table(models_table(evaluation), graphs))
+    for number, (name, each) in enumerate(evaluation.models.items()):
+        model = _Model(each, dataset, files, _anchor_of(number))
+        parts.append(element("section", element("h1", escape(name)), *model.origin, id=_anchor_of(number)))
+        parts += model.sections()
+    return page(_TITLE, [head, element("main", *parts)], script=False)
+
+
+def _anchor_of(model: int) -> str:
+    return f"model-{model}"
+
+
+def _list(warnings: Sequence[Diagnostic]) -> str:
+    return (
+        element("ul", *(element("li", escape(each.message)) for each in warnings), class_="cause") if warnings else ""
+    )
+
+
+class _Model:
+    """What a page shows of one model.
+
+    Args:
+        evaluation: Its figures.
+        dataset: The labels.
+        files: Sensor files and their thumbnails.
+        anchor: What the anchors of its parts begin with.
+    """
+
+    def __init__(self, evaluation: Evaluation, dataset: Dataset, files: SensorFiles, anchor: str = "") -> None:
         self._evaluation, self._dataset, self._files = evaluation, dataset, files
+        self._prefix = f"{anchor}-" if anchor else ""
         self._backdrops: dict[str, Backdrop] = {}
         shown = {worst.frame for each in evaluation.scenarios for worst in each.worst[:SHOWN]}
         self._labels = {label.frame: label for label in dataset.labels(shown)}
 
-    def text(self) -> str:
-        """All of it."""
+    @property
+    def origin(self) -> tuple[str, ...]:
+        """What was judged on what."""
         found = self._evaluation
         score = f", score {found.least_score:g} or more" if found.least_score else ""
         told = f"{found.predictions} on {found.dataset}: found within {found.within}{score}"
-        warnings = [element("li", escape(each.message)) for each in found.warnings]
-        head = element(
-            "header",
-            element("h1", "Detections on the frames that match"),
-            element("p", escape(told)),
-            "" if found.benchmark is None else element("p", escape(found.benchmark.sentence), class_="hint"),
-            element("ul", *warnings, class_="cause") if warnings else "",
-        )
-        sections = [part for each in found.scenarios for part in self._scenario(each)]
-        summary = self._overview() if len(found.scenarios) > 1 else ""
-        return page("Detections on the frames that match", [head, element("main", summary, *sections)], script=False)
+        if found.benchmark is None:
+            return (element("p", escape(told)),)
+        return element("p", escape(told)), element("p", escape(found.benchmark.sentence), class_="hint")
+
+    def sections(self) -> list[str]:
+        """All scenarios, after a table of them where they are several."""
+        found = self._evaluation.scenarios
+        summary = [self._overview()] if len(found) > 1 else []
+        return [*summary, *(part for each in found for part in self._scenario(each))]
 
     def _overview(self) -> str:
         """All scenarios in one table, with links to each."""
         title, head, rows = overview(self._evaluation)
         place = {each.name: number for number, each in enumerate(self._evaluation.scenarios)}
         cells = [
-            [element("a", escape(row[0]), href=f"#scenario-{place[row[0]]}"), *map(_cell, row[1:])] for row in rows
+            [element("a", escape(row[0]), href=f"#{self._section(place[row[0]])}"), *map(_cell, row[1:])]
+            for row in rows
         ]
         return table(title.capitalize(), [name.lower() for name in head], cells)
 
     def _scenario(self, each: ScenarioEvaluation) -> Iterator[str]:
         counts = frame_counts(each)
-        sentences = [element("p", element("b", escape(role.sentence))) for role in each.headline]
+        sentences = [element("p", element("b", escape(role.finding(each.undecided)))) for role in each.headline]
+        for one in each.balances:
+            graphs = [_dots(own, others) for covariate in one.covariates for _, own, others in covariate.parts]
+            sentences.append(_table(balance_table(one), graphs))
+        sentences += [element("p", escape(role.sentence)) for role in each.headline]
         sentences += [element("p", escape(one.beside), class_="hint") for one in each.headline if one.asked]
         sentences += [element("p", escape(one.sentence)) for one in each.weighted]
         if each.simulated is not None:
@@ -165,13 +220,16 @@ class _Pages:
         ]
         parts.append(element("p", escape(_SIGNS), class_="hint"))
         parts.append(table("Worst frames", ("frame", "recording", "missed", "false boxes"), links))
-        yield element("section", *parts, id=f"scenario-{self._evaluation.scenarios.index(each)}")
+        yield element("section", *parts, id=self._section(self._evaluation.scenarios.index(each)))
         for one in worst:
             yield self._frame(each, one)
 
+    def _section(self, scenario: int) -> str:
+        return f"{self._prefix}scenario-{scenario}"
+
     def _anchor(self, each: ScenarioEvaluation, one: WorstFrame) -> str:
         place = next(number for number, other in enumerate(each.worst) if other is one)
-        return f"frame-{self._evaluation.scenarios.index(each)}-{place}"
+        return f"{self._prefix}frame-{self._evaluation.scenarios.index(each)}-{place}"
 
     def _frame(self, each: ScenarioEvaluation, one: WorstFrame) -> str:
         label = self._labels[one.frame]

@@ -119,9 +119,9 @@ def mean_errors(score: Reals, is_found: NDArray[np.bool_], errors: Reals, object
     """The mean of each error over what was found, shape (5,).
 
     Args:
-        score: Of each prediction, falling, shape (n,).
+        score: The score of each prediction, falling, shape (n,).
         is_found: Whether each is a label object.
-        errors: Of those that are, shape (found, 5), nan where unknown.
+        errors: The errors of those that are, shape (found, 5), nan where unknown.
         objects: How many label objects there are.
         clipped: Whether means up to each recall are averaged over the recalls reached, from above 10 %.
     """
@@ -164,7 +164,7 @@ def resampled_errors(sums: Reals, counts: Reals, found: Reals, objects: Reals, *
 
     Args:
         sums: Sum of the error over what was found up to each class of scores, shape (b, n).
-        counts: Of how many it is known.
+        counts: How many of these have a known error.
         found: How many were found.
         objects: How many label objects there are, shape (b,).
         clipped: See `mean_errors`.

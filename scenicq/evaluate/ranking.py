@@ -1,4 +1,4 @@
-"""Matches from typical to borderline, and matches that spread over recordings and random variables."""
+"""Rank matches from typical to borderline, and pick matches that spread over recordings and random variables."""
 
 from __future__ import annotations
 
@@ -48,9 +48,9 @@ def log_densities(
     Args:
         scenario: Compiled for the map of the labels.
         labels: Labels, each with the correspondence by which it matches.
-        options: Of the matcher, for what is compared.
-        draws: Of hidden variables.
-        seed: Of the draws.
+        options: The matcher's, for what is compared.
+        draws: How many draws of hidden variables.
+        seed: The seed of the draws.
     """
     written = scenario.as_written or scenario
     options = options or MatchOptions()
@@ -133,8 +133,8 @@ def densities(query: Query, results: Sequence[Result]) -> list[LogDensity | None
     """The log-density of each result that is a match, None for others.
 
     Args:
-        query: That they are of.
-        results: Of it.
+        query: The query that found them.
+        results: What it found.
     """
     labels = {label.frame: label for label in query.dataset.labels(result.frame for result in results)}
     by_map: dict[str, list[int]] = {}
@@ -151,11 +151,11 @@ def densities(query: Query, results: Sequence[Result]) -> list[LogDensity | None
 
 
 def rank_results(query: Query, results: Iterable[Result]) -> list[Result]:
-    """Results from typical to borderline, each with its log-density; what has none comes last, in its order.
+    """Sort results from typical to borderline, each with its log-density; those without one come last, in their order.
 
     Args:
-        query: That they are of.
-        results: Of it.
+        query: The query that found them.
+        results: What it found.
     """
     given = list(results)
     known = [replace(each, density=density) for each, density in zip(given, densities(query, given), strict=True)]
@@ -168,12 +168,12 @@ def rank_results(query: Query, results: Iterable[Result]) -> list[Result]:
 
 
 def sample_plain(results: Sequence[Result], count: int, seed: int = 0) -> list[Result]:
-    """Some matches at random, in their order.
+    """Pick matches at random, and keep their order.
 
     Args:
         results: Matches.
         count: How many.
-        seed: Of the choice.
+        seed: The seed of the choice.
     """
     if len(results) <= count:
         return list(results)
@@ -182,7 +182,7 @@ def sample_plain(results: Sequence[Result], count: int, seed: int = 0) -> list[R
 
 
 def sample_diverse(results: Sequence[Result], count: int) -> list[Result]:
-    """Some matches that spread over recordings and over values of the program's random variables, in their order.
+    """Pick matches that spread over recordings and over values of the random variables, and keep their order.
 
     Recordings take turns; of each, the match is taken that is farthest from those that are taken already, in the
     numbers of its witness, each scaled to its range, and in time.

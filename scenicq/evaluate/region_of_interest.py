@@ -1,4 +1,4 @@
-"""The part of a map that a benchmark evaluates: near the drivable area."""
+"""The part of a map that a benchmark evaluates: what is near the drivable area."""
 
 from __future__ import annotations
 

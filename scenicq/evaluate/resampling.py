@@ -1,15 +1,16 @@
-"""What chance can do, over clusters of frames that resemble each other: recordings, or drives of several.
+"""Intervals and tests over clusters of frames that resemble each other: recordings, or drives of several.
 
 A share has the interval of Wilson (1927) at its effective number of objects: how many would vary as much as the share
 varies over clusters (Korn and Graubard 1998, "Confidence intervals for proportions with small expected number of
 positive counts estimated from survey data"), with Student's quantile of as many degrees of freedom as there are
 clusters, less one. A difference of two shares has the interval that theirs make (Newcombe 1998, "Interval estimation
-for the difference between independent proportions", method 10). Differences are tested twice, and the greater p-value
-counts: by flipping the signs of the clusters' contributions (Hemerik, Goeman and Finos 2020, "Robust testing in
-generalized linear models by sign flipping score contributions"), which knows how clusters differ, and by the exact
-test of two counts at their effective numbers, which knows how little few objects and few misses say. Other figures
-have percentiles of the bootstrap over clusters, moved outward for few of them (Hesterberg 2015, "What teachers should
-know about the bootstrap", section 5.3).
+for the difference between independent proportions", method 10; of two models on the same objects "Improved confidence
+intervals for the difference between binomial proportions based on paired data", 1998, method 10). Differences are
+tested twice, and the greater p-value counts: by flipping the signs of the clusters' contributions (Hemerik, Goeman and
+Finos 2020, "Robust testing in generalized linear models by sign flipping score contributions"), which knows how
+clusters differ, and by the exact test of two counts at their effective numbers, which knows how little few objects and
+few misses say. Other figures have percentiles of the bootstrap over clusters, moved outward for few of them (Hesterberg
+2015, "What teachers should know about the bootstrap", section 5.3).
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ __all__ = [
     "Interval",
     "count_test",
     "difference_interval",
+    "discordance_test",
     "effective_number",
     "holm",
     "interval_of",
@@ -152,7 +154,9 @@ def ratio_interval(part: Reals, whole: Reals, objects: float = math.inf, level: 
     return wilson(rate, number, student(level, clusters))
 
 
-def difference_interval(first: float, second: float, numbers: tuple[float, float], reach: float) -> Interval:
+def difference_interval(
+    first: float, second: float, numbers: tuple[float, float], reach: float, correlation: float = 0.0
+) -> Interval:
     """The interval of the first share less the second.
 
     Args:
@@ -160,12 +164,17 @@ def difference_interval(first: float, second: float, numbers: tuple[float, float
         second: The other.
         numbers: How many independent objects each is of.
         reach: Standard errors either way.
+        correlation: That of the two shares, where they are of the same objects.
     """
     low, high = wilson(first, numbers[0], reach)
     other_low, other_high = wilson(second, numbers[1], reach)
+
+    def apart(one: float, other: float) -> float:
+        return math.sqrt(max(0.0, one * one - 2 * correlation * one * other + other * other))
+
     return (
-        first - second - math.hypot(first - low, other_high - second),
-        first - second + math.hypot(high - first, second - other_low),
+        first - second - apart(first - low, other_high - second),
+        first - second + apart(high - first, second - other_low),
     )
 
 
@@ -226,6 +235,24 @@ def count_test(first: float, second: float, numbers: tuple[float, float]) -> flo
     here = float(chances[possible == own].sum())
     below, above = float(chances[possible < own].sum()), float(chances[possible > own].sum())
     return min(1.0, 2 * (min(below, above) + here / 2))
+
+
+def discordance_test(first: float, second: float) -> float:
+    """The probability that objects which only one of two misses divide as unevenly by chance (McNemar).
+
+    The exact test at effective numbers, which are rounded; what is found counts half, as numbers are discrete.
+
+    Args:
+        first: How many independent objects the first alone misses.
+        second: How many the other alone does.
+
+    Returns:
+        A p-value of two sides.
+    """
+    own, other = round(first), round(second)
+    chances = np.exp([_log_choose(own + other, k) - (own + other) * math.log(2) for k in range(own + other + 1)])
+    here, below = float(chances[own]), float(chances[:own].sum())
+    return min(1.0, 2 * (min(below, 1 - below - here) + here / 2))
 
 
 def _log_choose(of: int, number: int) -> float:

@@ -6,17 +6,31 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from scenicq.evaluate.balance import Balance
 from scenicq.evaluate.benchmark import BenchmarkFigures
 from scenicq.evaluate.classes import ClassFigures
-from scenicq.evaluate.comparison import ObjectComparison, Share, p_text
+from scenicq.evaluate.comparison import ObjectComparison, Share, ShareComparison, p_text
 from scenicq.evaluate.controls import PLACES
 from scenicq.evaluate.detection import FoundWithin
-from scenicq.evaluate.evaluation import Evaluation, ScenarioEvaluation
+from scenicq.evaluate.evaluation import Evaluation, ModelsEvaluation, ScenarioEvaluation
+from scenicq.evaluate.paired_models import PairedComparison
+from scenicq.evaluate.paired_runs import PairedRuns
 from scenicq.evaluate.precision import ERRORS
 from scenicq.evaluate.slices import Slice
 from scenicq.evaluate.weighting import Weighted
 
-__all__ = ["COLUMNS", "Table", "evaluation_record", "flat_rows", "overview", "tables"]
+__all__ = [
+    "COLUMNS",
+    "Table",
+    "balance_table",
+    "evaluation_record",
+    "flat_rows",
+    "models_record",
+    "models_rows",
+    "models_table",
+    "overview",
+    "tables",
+]
 
 Table = tuple[str, tuple[str, ...], list[tuple[str, ...]]]
 """Title, names of the columns, and rows of texts."""
@@ -46,6 +60,7 @@ COLUMNS: dict[str, type] = {
     "alone": float,
     "says": str,
     "because": str,
+    "model": str,
 }
 """Columns of the flat table: one row a figure with its interval."""
 
@@ -60,11 +75,8 @@ def _share(share: Share) -> dict[str, Any]:
     return told if math.isnan(share.recordings) else told | {"effective_recordings": round(share.recordings, 2)}
 
 
-def _comparison(each: ObjectComparison) -> dict[str, Any]:
+def _difference(each: ShareComparison) -> dict[str, Any]:
     return {
-        "about": each.about,
-        "missed": _share(each.share),
-        "others": _share(each.other),
         "difference": _number(each.difference),
         "difference_low": _number(each.interval[0]),
         "difference_high": _number(each.interval[1]),
@@ -73,16 +85,46 @@ def _comparison(each: ObjectComparison) -> dict[str, Any]:
         "recordings": each.recordings,
         "effective_recordings": round(each.effective, 2),
         "unit": each.unit,
-        "asked": each.asked,
-        "alone": each.alone,
-        "uncounted": each.uncounted,
-        "controls": dict(zip(PLACES, each.places, strict=True)),
+    }
+
+
+def _conclusion(each: ShareComparison, sentence: str) -> dict[str, Any]:
+    return {
         "margin": each.margin,
         "says": each.says,
         "missing": list(each.missing),
         "because": each.because,
         "more_recordings": each.more,
-        "sentence": each.sentence,
+        "sentence": sentence,
+    }
+
+
+def _comparison(each: ObjectComparison) -> dict[str, Any]:
+    return {
+        "about": each.about,
+        "missed": _share(each.share),
+        "others": _share(each.other),
+        **_difference(each),
+        "asked": each.asked,
+        "alone": each.alone,
+        "uncounted": each.uncounted,
+        "controls": dict(zip(PLACES, each.places, strict=True)),
+        **_conclusion(each, each.sentence),
+    }
+
+
+def _pair(each: PairedComparison) -> dict[str, Any]:
+    return {
+        "scenario": each.scenario,
+        "about": each.about,
+        "model": each.model,
+        "baseline": each.baseline,
+        "missed": _share(each.share),
+        "missed_by_baseline": _share(each.other),
+        "missed_by_model_alone": each.only_model,
+        "missed_by_baseline_alone": each.only_baseline,
+        **_difference(each),
+        **_conclusion(each, each.sentence),
     }
 
 
@@ -127,6 +169,40 @@ def _benchmark(each: BenchmarkFigures) -> dict[str, Any]:
     }
 
 
+def _paired(each: PairedRuns) -> dict[str, Any]:
+    rate, (low, high) = each.adjusted
+    return {
+        "pairs": each.pairs,
+        "without_runs": each.without,
+        "unit": each.unit,
+        "missed": _share(each.real),
+        "failed": each.simulated,
+        "difference": each.difference,
+        "difference_low": _number(each.interval[0]),
+        "difference_high": _number(each.interval[1]),
+        "explained": _number(each.explained),
+        "with_control_variate": {"rate": _number(rate), "low": _number(low), "high": _number(high)},
+        "sentence": each.sentence,
+    }
+
+
+def _balance(each: Balance) -> dict[str, Any]:
+    return {
+        "about": each.about,
+        "covariates": [
+            {
+                "by": one.by,
+                "mean": _number(one.means[0]),
+                "mean_of_others": _number(one.means[1]),
+                "standardized_difference": _number(one.apart),
+                "in_common": one.common,
+                "parts": [{"part": name, "share": own, "share_of_others": others} for name, own, others in one.parts],
+            }
+            for one in each.covariates
+        ],
+    }
+
+
 def _slice(each: Slice) -> dict[str, Any]:
     others = None if each.other is None else _share(each.other)
     source = {"source": each.source} if each.source else {}
@@ -147,17 +223,28 @@ def evaluation_record(evaluation: Evaluation) -> dict[str, Any]:
     }
 
 
+def models_record(found: ModelsEvaluation) -> dict[str, Any]:
+    """All figures of several models as nested values, ready for JSON."""
+    return {
+        "models": {name: evaluation_record(each) for name, each in found.models.items()},
+        "pairs": [_pair(each) for each in found.pairs],
+        "warnings": [each.message for each in found.warnings],
+    }
+
+
 def _scenario(each: ScenarioEvaluation) -> dict[str, Any]:
     found: dict[str, Any] = {
         "scenario": each.name,
         "matching_frames": each.matching,
         "other_frames": each.other,
         "undecided_frames": each.undecided,
+        "findings": [one.finding(each.undecided) for one in each.headline],
         "roles": [_comparison(role) for role in each.roles],
         "all_objects": _comparison(each.all_objects),
         "weighted": [_weighted(one) for one in each.weighted],
         "classes": [_figures(figures) for figures in each.classes],
         "slices": [_slice(part) for part in each.slices],
+        "balance": [_balance(one) for one in each.balances],
         "worst_frames": [
             {"frame": one.frame, "recording": one.recording, "missed": one.missed, "of": one.of, "false": one.false}
             for one in each.worst
@@ -166,7 +253,8 @@ def _scenario(each: ScenarioEvaluation) -> dict[str, Any]:
     if each.simulated is not None:
         simulated = each.simulated
         found["simulated"] = {
-            "failed": _share(simulated.share), "says": simulated.says, "sentence": simulated.sentence
+            "failed": _share(simulated.share), "says": simulated.says, "sentence": simulated.sentence,
+            "paired": None if simulated.paired is None else _paired(simulated.paired),
         }  # fmt: skip
     return found
 
@@ -180,12 +268,7 @@ def flat_rows(evaluation: Evaluation) -> Iterator[dict[str, Any]]:
             yield _row("", "benchmark", whole.name, measure=name, value=value)
     for one in evaluation.scenarios:
         for table, each in (*(("roles", role) for role in one.roles), ("all", one.all_objects)):
-            yield _row(
-                one.name, table, each.about, measure="missed", **_of(each.share), **_of_others(each.other),
-                p_value=each.p_value, p_corrected=each.p_corrected, recordings=each.effective,
-                difference=each.difference, difference_low=each.interval[0], difference_high=each.interval[1],
-                alone=each.alone, says=each.says, because=each.because,
-            )  # fmt: skip
+            yield _row(one.name, table, each.about, measure="missed", **_compared_figures(each), alone=each.alone)
         for part in one.weighted:
             yield _row(
                 one.name, "weighted", part.about, measure="missed", **{**_of(part.share), "objects": part.equal},
@@ -217,6 +300,29 @@ def flat_rows(evaluation: Evaluation) -> Iterator[dict[str, Any]]:
             yield _row(one.name, "frames", worst.frame, measure="missed", value=share, objects=float(worst.of))
 
 
+def models_rows(found: ModelsEvaluation) -> Iterator[dict[str, Any]]:
+    """One row a figure of each model, and one a pair, with the keys of `COLUMNS`.
+
+    A pair's others are the same objects, as the baseline has missed them.
+    """
+    for name, each in found.models.items():
+        yield from ({**row, "model": name or None} for row in flat_rows(each))
+    for pair in found.pairs:
+        yield _row(
+            pair.scenario, "pairs", pair.about, group=pair.baseline, measure="missed", **_compared_figures(pair),
+            model=pair.model,
+        )  # fmt: skip
+
+
+def _compared_figures(each: ShareComparison) -> dict[str, Any]:
+    low, high = each.interval
+    return {
+        **_of(each.share), **_of_others(each.other), "p_value": each.p_value, "p_corrected": each.p_corrected,
+        "recordings": each.effective, "difference": each.difference, "difference_low": low, "difference_high": high,
+        "says": each.says, "because": each.because,
+    }  # fmt: skip
+
+
 def _row(scenario: str, table: str, about: str, **given: Any) -> dict[str, Any]:
     row: dict[str, Any] = {**dict.fromkeys(COLUMNS), "scenario": scenario, "table": table, "about": about, **given}
     return {name: None if isinstance(value, float) and math.isnan(value) else value for name, value in row.items()}
@@ -244,7 +350,7 @@ _UNITS = {"translation": "m", "scale": "1 - IoU", "orientation": "rad", "velocit
 
 
 def overview(evaluation: Evaluation) -> Table:
-    """What answers the question, of all scenarios in one table."""
+    """The answers of all scenarios in one table."""
     simulated = any(each.simulated is not None for each in evaluation.scenarios)
     rows: list[tuple[str, ...]] = []
     for one in evaluation.scenarios:
@@ -259,6 +365,42 @@ def overview(evaluation: Evaluation) -> Table:
     return "scenarios", ("SCENARIO", *_COMPARED, *more), rows
 
 
+def models_table(found: ModelsEvaluation) -> Table:
+    """Each model beside each that comes before it."""
+    several = len({each.scenario for each in found.pairs}) > 1
+    head = ("MODEL", "BESIDE", "WHAT", "OBJECTS", "MISSED", "BY THE OTHER", "POINTS", "P", "CORRECTED", "RECORDINGS",
+            "SAYS")  # fmt: skip
+    rows: list[tuple[str, ...]] = []
+    for each in found.pairs:
+        missed, other, chance, corrected, recordings, says = _said(each)
+        cells = (each.model, each.baseline, each.about, f"{each.share.of:g}", missed, other, _points(each), chance,
+                 corrected, recordings, says)  # fmt: skip
+        rows.append((each.scenario, *cells) if several else cells)
+    return "models, each beside those before it", ("SCENARIO", *head) if several else head, rows
+
+
+def balance_table(each: Balance) -> Table:
+    """How alike the objects in question and those beside them are."""
+    rows: list[tuple[str, ...]] = []
+    for one in each.covariates:
+        spread = f"{one.by}: {100 * one.common:.0f} % in common"
+        if not math.isnan(one.means[0]):
+            spread += f", means {one.means[0]:.1f} and {one.means[1]:.1f} m"
+        if not math.isnan(one.apart):
+            spread += f", {abs(one.apart):.2f} standard deviations apart"
+        for number, (name, own, others) in enumerate(one.parts):
+            rows.append((spread if number == 0 else "", name, _percent(own), _percent(others)))
+    return f"{each.about} and those beside it: how alike they are", ("WHAT", "PART", "IN QUESTION", "OTHERS"), rows
+
+
+def _points(each: ShareComparison) -> str:
+    """The difference in points, with its interval."""
+    if math.isnan(each.difference):
+        return "-"
+    low, high = (100 * end for end in each.interval)
+    return f"{100 * each.difference:+.0f}" + ("" if math.isnan(low) else f" [{low:+.0f}, {high:+.0f}]")
+
+
 def frame_counts(scenario: ScenarioEvaluation) -> str:
     """How many frames match, do not, and are undecided, in words."""
     told = f"{scenario.matching:,} frames match, {scenario.other:,} do not"
@@ -267,7 +409,7 @@ def frame_counts(scenario: ScenarioEvaluation) -> str:
 
 
 def tables(scenario: ScenarioEvaluation, within: FoundWithin) -> list[Table]:
-    """What people look at: roles, each class at its centre distance, slices."""
+    """The tables for people: roles, each class at its centre distance, slices."""
     found: list[Table] = [
         (
             "missed",
@@ -319,18 +461,23 @@ _COMPARED = ("WHAT", "OBJECTS", "MISSED", "OTHERS ALIKE", "P", "CORRECTED", "REC
 
 
 def _compared(each: ObjectComparison) -> tuple[str, ...]:
+    objects = f"{each.share.of:g}" + (f" of {each.asked}" if each.asked > each.share.of else "")
+    return (each.about, objects, *_said(each))
+
+
+def _said(each: ShareComparison) -> tuple[str, str, str, str, str, str]:
+    """Both shares, the p-value, the corrected one, recordings, and what they say."""
+
     def shown(value: float) -> str:
         return "-" if math.isnan(value) else p_text(value).removeprefix("p ").removeprefix("= ")
 
+    equal = f" (as {each.effective:.1f} equal ones)" if each.effective < each.recordings - 0.05 else ""
     return (
-        each.about,
-        f"{each.share.of:g}" + (f" of {each.asked}" if each.asked > each.share.of else ""),
         _percent(each.share.rate, each.share.interval),
         _percent(each.other.rate, each.other.interval),
         shown(each.p_value),
         shown(each.p_corrected),
-        f"{each.recordings}"
-        + (f" (as {each.effective:.1f} equal ones)" if each.effective < each.recordings - 0.05 else ""),
+        f"{each.recordings}{equal}",
         each.says,
     )
 

@@ -37,9 +37,9 @@ class Slice:
     Attributes:
         by: What divides them.
         part: Which part.
-        share: Of the part's objects that were missed.
+        share: The share of the part's objects that was missed.
         other: The same among the other objects; None where that makes no sense.
-        source: What the program says at the place `by` of a random variable; "" of anything else.
+        source: The program's text at the place `by` of a random variable; "" for anything else.
     """
 
     by: str
@@ -62,7 +62,7 @@ class Slice:
 def slices(
     detection: Detection, matched: Matched, missed: Bools, mine: Bools, others: Bools, cluster: Numbers
 ) -> tuple[Slice, ...]:
-    """All slices with at least two parts, whose intervals hold all together in 95 % (Bonferroni).
+    """Make all slices with at least two parts; their intervals hold all together in 95 % (Bonferroni).
 
     Args:
         detection: Labels and predictions.
@@ -88,14 +88,14 @@ def slices(
 
 
 def _parts_of(detection: Detection, matched: Matched, mine: Bools) -> Iterator[tuple[str, str, Bools, bool]]:
-    """What divides the objects, the name of each part, which objects are of it, and whether others may be."""
+    """Divide the objects in each way: what divides, a part's name, which objects are in it, and if others can be."""
     objects, frames = detection.objects, detection.frames
     recording = frames.recording[objects.frame].astype(np.int64)
 
     def told(
         by: str, names: Sequence[str], part: Numbers, *, others_too: bool = True
     ) -> Iterator[tuple[str, str, Bools, bool]]:
-        """Slices by the number of each object's part, -1 for none."""
+        """Make slices by the number of each object's part, -1 for none."""
         there = [number for number in range(len(names)) if (mine & (part == number)).any()]
         # what differs between any two recordings, as their names do, is no slice
         shared = any(len(np.unique(recording[mine & (part == number)])) > 1 for number in there)
@@ -125,7 +125,7 @@ def _parts_of(detection: Detection, matched: Matched, mine: Bools) -> Iterator[t
 
 
 def _place(by: str) -> str:
-    """The place of a random variable, of which a coordinate may divide."""
+    """The place of a random variable, without the coordinate that divides."""
     return by[:-2] if by.endswith((" x", " y")) else by
 
 
@@ -146,7 +146,7 @@ def _second(value: Any) -> Any:
 
 
 def _parts(values: Sequence[Any], of: NDArray[np.int32]) -> tuple[list[str], Numbers]:
-    """Names of the parts of some values, and the number of each value's; -1 for none.
+    """Divide values into parts: the parts' names, and the number of each value's part, -1 for none.
 
     Args:
         values: One a frame, None where there is none.

@@ -1,4 +1,4 @@
-"""Frames spread as a program spreads its scenes: how much each frame that matches counts.
+"""Weight frames that match so that they spread as the program spreads its scenes.
 
 The frames of a dataset that match are not spread as the program would draw them: some gaps, some roads are more
 frequent on the way. A frame counts by the density with which the program generates its values of random variables, over
@@ -37,10 +37,10 @@ def log_weights(log_density: Reals, values: Reals, finite: Sequence[Hashable], s
     """Logarithms of the weights of frames, which are 1 in the mean; shape (n,).
 
     Args:
-        log_density: Of the program at the values of each frame, up to a constant, shape (n,); finite.
-        values: Of the continuous random variables, shape (n, variables).
+        log_density: The program's log-density at the values of each frame, up to a constant, shape (n,); finite.
+        values: Those of the continuous random variables, shape (n, variables).
         finite: What the frame has of features without a density; frames count as neighbours where it is the same.
-        seed: Of the choice of frames that the estimate is made of, where there are many.
+        seed: Chooses the frames that the estimate is made of, where there are many.
     """
     count = len(log_density)
     if not count:
@@ -75,7 +75,7 @@ def log_weights(log_density: Reals, values: Reals, finite: Sequence[Hashable], s
 
 @dataclass(frozen=True, slots=True)
 class Weighted:
-    """How often objects are missed where frames are spread as the program spreads its scenes.
+    """The share of objects missed, were frames spread as the program spreads its scenes.
 
     Attributes:
         about: Which objects, such as "role parkedCar".
@@ -106,7 +106,7 @@ class Weighted:
 
 
 def weigh(about: str, missed: Bools, log_weight: Reals, cluster: NDArray[np.int64]) -> Weighted:
-    """The share of some objects that was missed, each counting by its weight.
+    """Work out the weighted share of objects that was missed.
 
     Args:
         about: Which objects.

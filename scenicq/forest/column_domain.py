@@ -437,7 +437,9 @@ def _picked(which: Array, options: Sequence[Array]) -> Array:
     return found
 
 
-def _allowed(places: ColumnPlaces, field: Data, point: Data, going: Data | None = None) -> Sequence[tuple[float, ...]]:
+def _allowed(
+    places: ColumnPlaces, field: Data, point: Data, going: Data | None = None, last: Data | None = None
+) -> Sequence[tuple[float, ...]]:
     """The headings that a field allows at each defined place."""
     if not len(places.defined):
         return ()
@@ -445,8 +447,10 @@ def _allowed(places: ColumnPlaces, field: Data, point: Data, going: Data | None 
     only = fields.options[0] if len(fields.options) == 1 else None
     if only is not None and not isinstance(only, Undefined):
         if isinstance(only, ElementAtPoint) and isinstance(going, np.ndarray):
-            # where there is no heading, it is nan
-            return [(each,) for each in only.along_many(xy, places.spread(going)[places.defined].tolist())]
+            # where there is no heading or no lane, it is nan
+            before = last if isinstance(last, np.ndarray) else np.full(1, np.nan)
+            ways, lanes = (places.spread(each)[places.defined].tolist() for each in (going, before))
+            return [(each,) for each in only.along_many(xy, ways, lanes)]
         return cast(VectorField, only).values_many(xy)
     which: list[int] = places.spread(fields.which)[places.defined].tolist()
     found = [directions(fields.options[one], (x, y)) for one, (x, y) in zip(which, xy.tolist(), strict=True)]

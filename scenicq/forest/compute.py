@@ -10,10 +10,12 @@ from __future__ import annotations
 import math
 import operator
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Any, cast
 
 from scenicq.forest.kinds import kind_of_value
 from scenicq.forest.nodes import (
+    AheadInLanes,
     Among,
     Arithmetic,
     ArithmeticOp,
@@ -56,11 +58,15 @@ from scenicq.geometry.boxes import box_polygon
 from scenicq.geometry.containment import covers, overlaps
 from scenicq.geometry.driven_courses import CoursePlace, lane_course
 from scenicq.geometry.fields import VectorField
+from scenicq.geometry.lane_stretches import ahead_in_lanes
 from scenicq.geometry.measures import MovingBoxes, measure_tracks, time_to_collision
 from scenicq.geometry.membership import contains, distance
+from scenicq.geometry.network import Network
 from scenicq.geometry.occupancy import ElementAtPoint
 from scenicq.geometry.regions import (
     Disc,
+    Nowhere,
+    PolygonSet,
     Rectangle,
     Region,
     Sector,
@@ -194,25 +200,26 @@ def _track_measure(node: Measure, courses: tuple[CoursePlace, ...]) -> float:
     return low
 
 
-def directions(field: Value, point: Value, going: Value = None) -> tuple[float, ...] | Undefined:
+def directions(field: Value, point: Value, going: Value = None, last: Value = None) -> tuple[float, ...] | Undefined:
     """The headings that a vector field allows at a point, at least one; `Undefined` where it has none.
 
     Args:
         field: The field.
         point: The point.
         going: The heading of who is there, where it matters; None if there is none.
+        last: The last lane of its track likewise.
 
     Raises:
         CannotEvaluate: If they are no field and no point.
     """
-    for arg in (field, point, going):
+    for arg in (field, point, going, last):
         if isinstance(arg, Undefined):
             return arg
     if kind_of_value(field) != "field" or not isinstance(point, tuple):
         raise CannotEvaluate(f"the direction of {field!r} at {point!r}")
     x, y = point
     if isinstance(field, ElementAtPoint) and isinstance(going, float):
-        return (field.along(x, y, going),)
+        return (field.along(x, y, going, last if isinstance(last, float) else math.nan),)
     allowed = cast(VectorField, field).values(x, y)
     name = getattr(field, "name", "the field")
     return allowed or Undefined(f"`{name}` is undefined at ({x:.2f}, {y:.2f})")
@@ -314,6 +321,8 @@ def _compute_region(node: Node, args: tuple[Value, ...]) -> Value:
             if course.line is None:
                 raise CannotEvaluate("there is no course")
             return course.line.within(half_width)
+        case AheadInLanes(), ((float() as x, float() as y), way, last, float() as metres):
+            return _ahead(node.network, x, y, _known(way), _known(last), metres)
         case Intersects(), (left, right):
             return _intersects(cast(Region, left), cast(Region, right))
         case Encloses(), (outer, inner):
@@ -322,6 +331,20 @@ def _compute_region(node: Node, args: tuple[Value, ...]) -> Value:
             raise CannotEvaluate("what holds of label objects without a role")
         case _:
             raise TypeError(f"no value for {args!r}")
+
+
+def _known(value: object) -> float | None:
+    """A number; None where there is none, which is nan in columns."""
+    return value if isinstance(value, float) and not math.isnan(value) else None
+
+
+@lru_cache(maxsize=1024)
+def _ahead(
+    network: Network, x: float, y: float, way: float | None, last: float | None, distance: float
+) -> PolygonSet | Nowhere:
+    """One object's stretch of lanes, which is asked for by all that may lie in it."""
+    parts = ahead_in_lanes(network, x, y, way, last, distance)
+    return PolygonSet(parts, "what lies ahead", network.roadDirection) if parts else Nowhere()
 
 
 def fold(node: Node) -> Node:

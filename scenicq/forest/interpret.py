@@ -10,6 +10,7 @@ from collections.abc import Container, Mapping, Sequence
 from typing import Protocol, TypeAlias, TypeVar, assert_never
 
 from scenicq.forest.nodes import (
+    AheadInLanes,
     Among,
     Arithmetic,
     ArithmeticOp,
@@ -63,7 +64,7 @@ OnMap: TypeAlias = (
 )  # fmt: skip
 """What is asked of regions, vector fields and courses."""
 RegionNode: TypeAlias = (
-    DiscAt | SectorAt | RectangleAt | Corridor | RegionUnion | RegionIntersection | RegionDifference
+    DiscAt | SectorAt | RectangleAt | Corridor | AheadInLanes | RegionUnion | RegionIntersection | RegionDifference
 )  # fmt: skip
 Steps: TypeAlias = Sequence[tuple[Node, tuple[Node, ...]]]
 """Nodes with their children, which come before them."""
@@ -202,8 +203,8 @@ def _value(node: Node, args: list[V], domain: AbstractDomain[V]) -> V:
         ):  # fmt: skip
             return domain.on_map(node, args)
         case (
-            DiscAt() | SectorAt() | RectangleAt() | Corridor() | RegionUnion() | RegionIntersection()
-            | RegionDifference()
+            DiscAt() | SectorAt() | RectangleAt() | Corridor() | AheadInLanes() | RegionUnion()
+            | RegionIntersection() | RegionDifference()
         ):  # fmt: skip
             return domain.region(node, args)
         case Among():

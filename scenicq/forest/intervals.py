@@ -17,6 +17,7 @@ from scenicq.forest.interpret import OnMap, RegionNode
 from scenicq.forest.interval_arithmetic import IntervalArithmetic
 from scenicq.forest.interval_values import FloatOrArray, Interval, IntervalValue, IntervalVector, Truth
 from scenicq.forest.nodes import (
+    AheadInLanes,
     Among,
     AmongOp,
     ArithmeticOp,
@@ -291,7 +292,7 @@ class IntervalDomain(IntervalArithmetic[E]):
                 return reduce(self._common, boxes)
             case RegionDifference():
                 return boxes[0]
-            case Corridor():
+            case Corridor() | AheadInLanes():
                 return self._pair(None)
             case DiscAt() | SectorAt():
                 reach = self.largest(self._scalar(args[1]))

@@ -25,12 +25,13 @@ from scenicq.geometry.network import Network
 from scenicq.geometry.regions import Region
 
 __all__ = [
-    "CLOCK", "COURSE", "ELEMENT", "GIVEN", "GOING", "IDENTITY", "MIRRORED", "PAST", "RANK", "TRACK", "WHO",
-    "Among", "AmongOp", "Arithmetic", "ArithmeticOp", "Bearing", "Body", "Compare", "CompareOp", "Constant", "Contains",
-    "Coordinate", "Corridor", "CourseCoordinate", "DirectionAt", "DiscAt", "DiscreteRange", "Distance", "Encloses",
-    "Feature", "Identity", "Index", "Intersects", "Kind", "LaneCourse", "Leaf", "Logic", "LogicOp", "Measure", "Node",
-    "Norm", "Normal", "PointIn", "Range", "RectangleAt", "RegionDifference", "RegionIntersection", "RegionUnion",
-    "Rotate", "Scale", "SectorAt", "Select", "TruncatedNormal", "Undefined", "Value", "Vector", "VectorOf", "VectorSum",
+    "CLOCK", "COURSE", "ELEMENT", "GIVEN", "GOING", "IDENTITY", "LAST_LANE", "MIRRORED", "PAST", "RANK", "TRACK", "WHO",
+    "AheadInLanes", "Among", "AmongOp", "Arithmetic", "ArithmeticOp", "Bearing", "Body", "Compare", "CompareOp",
+    "Constant", "Contains", "Coordinate", "Corridor", "CourseCoordinate", "DirectionAt", "DiscAt", "DiscreteRange",
+    "Distance", "Encloses", "Feature", "Identity", "Index", "Intersects", "Kind", "LaneCourse", "Leaf", "Logic",
+    "LogicOp", "Measure", "Node", "Norm", "Normal", "PointIn", "Range", "RectangleAt", "RegionDifference",
+    "RegionIntersection", "RegionUnion", "Rotate", "Scale", "SectorAt", "Select", "TruncatedNormal", "Undefined",
+    "Value", "Vector", "VectorOf", "VectorSum",
 ]  # fmt: skip
 
 Vector: TypeAlias = tuple[float, float]
@@ -54,6 +55,8 @@ COURSE = "driven course"
 """The property of an object that is its course; no program can give one of such a name."""
 GOING = "way it goes"
 """The property of an object that tells its lanes from others at its place: its heading, None where a label has none."""
+LAST_LANE = "last lane"
+"""The property of an object that does so where its heading does not: the number of its track's last lane, or None."""
 CLOCK = "time of the sample"
 """The property of any object that is the time of a sample, in seconds from a moment of its recording."""
 PAST = "past value of "
@@ -300,7 +303,8 @@ class DirectionAt(_Scalar):
     """The heading of a vector field at a point; where the field allows several, any of them.
 
     Attributes:
-        going: Which way goes who is there, where that tells which of several elements is meant; else empty.
+        going: Which way goes who is there and the last lane of its track, where that tells which of several elements is
+            meant; else empty.
     """
 
     field: Node
@@ -455,6 +459,22 @@ class Corridor(_Region):
     half_width: Node
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class AheadInLanes(_Region):
+    """What lies in the lanes of an object from its place to so many metres on (`scenicq.geometry.lane_stretches`).
+
+    Attributes:
+        heading, last: Its own and the number of its track's last lane, which tell its lanes from others; None for all.
+        network: The map.
+    """
+
+    point: Node
+    heading: Node
+    last: Node
+    distance: Node
+    network: Network
+
+
 # --- booleans
 
 
@@ -572,6 +592,6 @@ Leaf: TypeAlias = Range | Normal | TruncatedNormal | DiscreteRange | Index | Poi
 Node: TypeAlias = (
     Constant | Feature | Leaf | Select | Arithmetic | Coordinate | Norm | Bearing | Distance | DirectionAt |
     CourseCoordinate | Measure | LaneCourse | VectorOf | VectorSum | Scale | Rotate | DiscAt | SectorAt |
-    RectangleAt | Corridor |
+    RectangleAt | Corridor | AheadInLanes |
     RegionUnion | RegionIntersection | RegionDifference | Compare | Logic | Contains | Intersects | Encloses | Among
 )  # fmt: skip

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import cast
 
 from scenicq.forest.nodes import (
+    AheadInLanes,
     Among,
     Arithmetic,
     ArithmeticOp,
@@ -100,6 +101,8 @@ class ValueNumbers:
                     own = node.measure, node.seconds, node.end
                 case LaneCourse():
                     own = id(node.network), node.gap_s
+                case AheadInLanes():
+                    own = id(node.network)
                 case _ if is_leaf(node):
                     own = node.identity  # type: ignore[union-attr]
                 case _:

@@ -166,6 +166,7 @@ class Lane(LongElement):
         maneuvers: Ways on from its end.
         predecessors: Lanes that lead here.
         successors: Lanes that it leads to.
+        number: Its number among the elements of its map; -1 of one that is in none.
     """
 
     group: LaneGroup | None = field(default=None, repr=False, kw_only=True)
@@ -175,6 +176,7 @@ class Lane(LongElement):
     maneuvers: tuple[Maneuver, ...] = field(default=(), repr=False, kw_only=True)
     predecessors: tuple[Lane, ...] = field(default=(), repr=False, kw_only=True)
     successors: tuple[Lane, ...] = field(default=(), repr=False, kw_only=True)
+    number: int = field(default=-1, repr=False, kw_only=True)
 
     @property
     def isForward(self) -> bool:

@@ -79,8 +79,8 @@ def link(features: Sequence[MapFeature]) -> Elements:
         features: With unique ids.
     """
     elements = Elements()
-    for feature in features:
-        _make(feature, elements)
+    for number, feature in enumerate(features):
+        _make(feature, number, elements)
     by_kind: dict[str, list[MapFeature]] = {}
     for feature in features:
         by_kind.setdefault(feature.kind, []).append(feature)
@@ -103,14 +103,14 @@ def link(features: Sequence[MapFeature]) -> Elements:
     return elements
 
 
-def _make(feature: MapFeature, elements: Elements) -> None:
+def _make(feature: MapFeature, number: int, elements: Elements) -> None:
     if feature.kind == "curb":
         return
     area = cast("Polygon | MultiPolygon", feature.shape)
     plain = (feature.id, area, feature.properties)
     match feature.kind:
         case "lane":
-            elements.lanes[feature.id] = _along(Lane(*plain), feature)
+            elements.lanes[feature.id] = _along(Lane(*plain, number=number), feature)
         case "lane_group":
             elements.groups[feature.id] = _along(LaneGroup(*plain), feature)
         case "road":

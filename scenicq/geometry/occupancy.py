@@ -6,14 +6,15 @@ looked at. The field's angles number the options; an angle times `scale` is the 
 
 Where elements overlap, Scenic takes the first in the order of its lists, an accident; here each of them is allowed, and
 a rank says which (as with the directions of traffic). Who is there and which way it goes may leave only some of them:
-those that lead within `ALONG` of its heading, if there are any. A point in none, but within the map's tolerance of
-some, counts as in these, as in Scenic; here the border is a polygon, so that the plane falls into convex pieces.
+those that lead within `ALONG` of its heading or continue the last lane of its track, if any do. A point in none, but
+within the map's tolerance of some, counts as in these, as in Scenic; here the border is a polygon, so that the plane
+falls into convex pieces.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TypeAlias
@@ -30,7 +31,7 @@ from scenicq.geometry.regions import SLACK
 from scenicq.geometry.road_direction import RoadDirection
 from scenicq.geometry.shapes import Bounds, Shape
 
-__all__ = ["ALONG", "TOLERANCE", "ElementAtPoint", "Layer", "Occupancy", "OptionArea"]
+__all__ = ["ALONG", "TOLERANCE", "ElementAtPoint", "Layer", "Occupancy", "OptionArea", "leads"]
 
 ALONG = math.radians(60)
 """How far a lane may lead from the heading of who is in it for it to be one of its own, where several are there."""
@@ -47,8 +48,15 @@ Layer: TypeAlias = tuple[OptionArea, ...]
 Corners: TypeAlias = NDArray[np.float64]
 _Point: TypeAlias = tuple[float, float]
 """A point in metres."""
+_Owners: TypeAlias = tuple[int, tuple[int, ...]]
+"""The number of the layer that counts at a point, and the owners of its areas there."""
 _Meant: TypeAlias = tuple[bool, ...]
 """Which of the options at a point may be meant."""
+
+
+def leads(ways: Iterable[float], heading: float) -> bool:
+    """Whether some of the directions of a lane is that of who goes there."""
+    return any(abs(math.remainder(way - heading, math.tau)) <= ALONG for way in ways)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,6 +84,8 @@ class Occupancy:
         name: What messages call it.
         elements: The id of the map element that each area of each layer is, or a part of.
         ways: The direction of each owner of areas of each layer, by its number; None where it has none.
+        continued: The numbers of the lanes that each of these continues: itself, and those that lead to it.
+        owners: The id of each of these.
     """
 
     layers: tuple[Layer, ...] = field(repr=False)
@@ -83,6 +93,13 @@ class Occupancy:
     name: str
     elements: tuple[tuple[str, ...], ...] = field(default=(), repr=False)
     ways: tuple[tuple[RoadDirection | None, ...], ...] = field(default=(), repr=False)
+    continued: tuple[tuple[frozenset[int], ...], ...] = field(default=(), repr=False)
+    owners: tuple[tuple[str, ...], ...] = field(default=(), repr=False)
+
+    @cached_property
+    def is_of_lanes(self) -> bool:
+        """Whether all areas of the first layer are those of lanes."""
+        return bool(self.continued) and all(self.continued[0])
 
     @cached_property
     def scale(self) -> int:
@@ -128,29 +145,57 @@ class Occupancy:
             self._known_together[key] = known
         return known
 
-    def along(self, found: Sequence[tuple[int, ...]], places: Sequence[_Point], going: Sequence[float]) -> list[_Meant]:
-        """Which of the options at places lead the way that somebody goes: all, if none does.
+    def along(
+        self,
+        found: Sequence[tuple[int, ...]],
+        places: Sequence[_Point],
+        going: Sequence[float],
+        last: Sequence[float],
+    ) -> list[_Meant]:
+        """Which of the options at places lead the way that somebody goes, or continue the last lane: all, if none does.
 
         Args:
             found: The options, of which each place has several.
             places: The places.
             going: The headings.
+            last: The numbers of the last lanes of their tracks, nan where there is none.
         """
         new = [place for place in dict.fromkeys(places) if place not in self._known_ways]
         if new:
             self._find_ways(new)
         meant: list[_Meant] = []
-        for options, place, heading in zip(found, places, going, strict=True):
-            ways = self._known_ways[place]
-            own = tuple(any(abs(math.remainder(way - heading, math.tau)) <= ALONG for way in each) for each in ways)
+        for options, place, heading, before in zip(found, places, going, last, strict=True):
+            ways, (level, owners) = self._known_ways[place]
+            own = tuple(leads(each, heading) for each in ways)
+            if not math.isnan(before):
+                continuing = (before in self.continued[level][owner] for owner in owners)
+                own = tuple(along or further for along, further in zip(own, continuing, strict=True))
             meant.append(own if any(own) else (True,) * len(options))
         return meant
+
+    def owners_at(self, place: _Point, going: float, last: float) -> list[tuple[str, bool]]:
+        """Who owns the areas of the first layer at a point, each with whether it may be meant for who is there.
+
+        Args:
+            place: The point.
+            going: The heading of who is there; nan where each may be meant.
+            last: The number of the last lane of its track; nan if there is none.
+        """
+        owners: dict[_Point, _Owners] = {}
+        found = self._find(np.array([place]), [place], owners)
+        level, numbers = owners.get(place, (0, ()))
+        if level or not numbers:
+            return []
+        meant = (True,) * len(numbers)
+        if len(numbers) > 1 and not math.isnan(going):
+            (meant,) = self.along(found, [place], [going], [last])
+        return [(self.owners[level][number], each) for number, each in zip(numbers, meant, strict=True)]
 
     def _find_ways(self, places: Sequence[_Point]) -> None:
         """The headings that each of several options at places leads in, which are kept by their places."""
         if len(self._known_ways) + len(places) > _KEPT:
             self._known_ways.clear()
-        owners: dict[_Point, tuple[int, tuple[int, ...]]] = {}
+        owners: dict[_Point, _Owners] = {}
         self._find(np.array(places), places, owners)
         asked: dict[tuple[int, int], list[_Point]] = {}
         for place, (level, numbers) in owners.items():
@@ -162,13 +207,13 @@ class Occupancy:
             headings = [()] * len(some) if way is None else way.values_many(np.array(some))
             said.update({(level, number, place): each for place, each in zip(some, headings, strict=True)})
         for place, (level, numbers) in owners.items():
-            self._known_ways[place] = tuple(said[level, number, place] for number in numbers)
+            self._known_ways[place] = tuple(said[level, number, place] for number in numbers), (level, numbers)
 
     def _find(
         self,
         xy: NDArray[np.float64],
         places: Sequence[_Point],
-        owners: dict[_Point, tuple[int, tuple[int, ...]]] | None = None,
+        owners: dict[_Point, _Owners] | None = None,
     ) -> list[tuple[int, ...]]:
         """`at` for points (n, 2), which are kept by their places.
 
@@ -357,7 +402,7 @@ class Occupancy:
         return {}
 
     @cached_property
-    def _known_ways(self) -> dict[_Point, tuple[tuple[float, ...], ...]]:
+    def _known_ways(self) -> dict[_Point, tuple[tuple[tuple[float, ...], ...], _Owners]]:
         return {}
 
     @cached_property
@@ -403,11 +448,18 @@ class ElementAtPoint:
         rank, scale = self.rank, self.options.scale
         return [(found[rank % len(found)] / scale,) for found in self.options.at_many(xy)]
 
-    def along(self, x: float, y: float, heading: float) -> float:
-        """The angle that stands for the option at a point for who is there with a heading; nan if it has none."""
-        return self.along_many(np.array([[x, y]]), [heading])[0]
+    def along(self, x: float, y: float, heading: float, last: float = math.nan) -> float:
+        """The angle that stands for the option at a point for who is there.
 
-    def along_many(self, xy: NDArray[np.float64], going: Sequence[float]) -> list[float]:
+        Args:
+            x: The point.
+            y: The point.
+            heading: That of who is there; nan if it has none.
+            last: The number of the last lane of its track; nan if there is none.
+        """
+        return self.along_many(np.array([[x, y]]), [heading], [last])[0]
+
+    def along_many(self, xy: NDArray[np.float64], going: Sequence[float], last: Sequence[float]) -> list[float]:
         """`along` for points of shape (n, 2)."""
         options, rank, scale = self.options, self.rank, self.options.scale
         found = options.at_many(xy)
@@ -416,7 +468,7 @@ class ElementAtPoint:
         if several:
             some = [found[place] for place in several]
             places: list[_Point] = [(x, y) for x, y in xy[several].tolist()]
-            meant = options.along(some, places, [going[place] for place in several])
+            meant = options.along(some, places, [going[place] for place in several], [last[place] for place in several])
             for place, mine, those in zip(several, some, meant, strict=True):
                 if not those[rank % len(mine)]:
                     numbers[place] = mine[those.index(True)]

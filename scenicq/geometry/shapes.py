@@ -12,8 +12,8 @@ from typing import Any, TypeAlias, cast
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from shapely import STRtree
-from shapely.geometry import Point
+from shapely import STRtree, ops
+from shapely.geometry import LineString, Point, Polygon
 from shapely.geometry import shape as shape_of
 from shapely.geometry.base import BaseGeometry
 
@@ -278,6 +278,16 @@ def divided(shape: Shape, others: Sequence[Shape]) -> tuple[Shape, ...]:
     lines = union_all(shapely.boundary(array([shape, *others])).tolist())
     faces = shapely.get_parts(shapely.polygonize(shapely.get_parts(lines)))
     return tuple(face for face in faces if shapely.contains_xy(shape, *inner_point(face)))
+
+
+def split(area: Polygon, across: LineString) -> list[Polygon]:
+    """The parts into which a line cuts a polygon; itself where the line does not go through it."""
+    return cast("list[Polygon]", list(ops.split(area, across).geoms))
+
+
+def part_of_line(along: LineString, start: float, end: float) -> LineString:
+    """A line from so many metres along it to so many."""
+    return cast(LineString, ops.substring(along, start, end))
 
 
 def places_along(shape: Shape, step: float) -> Coordinates:

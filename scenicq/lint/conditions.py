@@ -400,7 +400,7 @@ def _exact(scenario: Scenario, options: MatchOptions) -> Iterator[Diagnostic]:
             ):
                 number = f"{given.value.value:g}"
                 yield _warning(
-                    "exact-number", f"`{name}` is to be exactly {number}, which what is measured hardly ever is",
+                    "exact-number", f"`{name}` will almost never be exactly {number}: measurements are not exact",
                     given.span, "compared without tolerance",
                     f"`--tolerance {name}=0.5` allows for it, as does `Range(a, b)` instead of {number}",
                 )  # fmt: skip

@@ -240,7 +240,7 @@ def _exact(node: ast.SyntaxNode) -> Iterator[Diagnostic]:
             near = measured.span.text if number(asked) == 0 else f"({measured.span.text}) - {asked.span.text}"
             within = "5 deg" if is_angle(measured) else "0.5"
             yield make_warning(
-                "exact-number", f"`==` asks for exactly {asked.span.text}, which what is measured hardly ever is",
+                "exact-number", f"`== {asked.span.text}` will almost never hold: measurements are not exact",
                 node.span, "no tolerance holds in requirements",
                 f"`abs({near}) < {within}` asks for what is near it",
             )  # fmt: skip

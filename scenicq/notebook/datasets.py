@@ -62,7 +62,7 @@ class OpenedDataset:
         return Matches(Query(self.dataset, source, read_options(**texts)))
 
     def sql(self, query: str) -> duckdb.DuckDBPyRelation:
-        """Ask the dataset's tables, which are read and never written; tables and columns as in README.
+        """Ask the dataset's tables, which are read and never written; `scenicq info --columns` lists them.
 
         Args:
             query: SQL as DuckDB knows it.

@@ -18,7 +18,7 @@ import msgspec
 from scenicq.errors import render
 from scenicq.evaluate.comparison import MARGIN
 from scenicq.evaluate.detection import Missing
-from scenicq.evaluate.evaluation import evaluate
+from scenicq.evaluate.evaluation import evaluate_models, name_models
 from scenicq.lint.program import lint_query
 from scenicq.match.matcher import Matcher
 from scenicq.match.verdict import NoMatch
@@ -131,7 +131,7 @@ class FrameResult(_Origin):
         )
 
     def explain(self) -> DisplayedText:
-        """Why the frame or interval matches, or what keeps it from it."""
+        """Say why the frame or interval matches, or what prevents it."""
         if self.result.interval is None:
             return self.matches.explain(self.frame)
         query = self.matches.query
@@ -294,7 +294,7 @@ class Matches(Sequence[FrameResult]):
         return Shot(label, world.scenario, verdict, why), self._backdrop(label)
 
     def explain(self, frame: str) -> DisplayedText:
-        """Why a frame or a recording matches, or what keeps it from it and what would do.
+        """Say why a frame or recording matches, or what prevents it and which change would make it match.
 
         Args:
             frame: The name of any frame of the dataset; over time also of a recording, and after `@` when the interval
@@ -344,7 +344,7 @@ class Matches(Sequence[FrameResult]):
 
     def evaluate(
         self,
-        predictions: str | Path,
+        predictions: str | Path | Sequence[str | Path],
         *,
         distance_m: float | str | Mapping[str, float] = 2.0,
         least_score: float | None = None,
@@ -357,7 +357,8 @@ class Matches(Sequence[FrameResult]):
         """Say whether a model fails on the frames that match.
 
         Args:
-            predictions: A file of what the model has detected.
+            predictions: A file of what the model has detected; or those of several models, each of which is also
+                compared with those before it.
             distance_m: Centre distance within which an object counts as found: 0.5, 1, 2 or 4; for some classes
                 another one, such as "2,pedestrian=0.5" or {"": 2, "pedestrian": 0.5}.
             least_score: Score from which a prediction counts; all by default.
@@ -372,11 +373,14 @@ class Matches(Sequence[FrameResult]):
                 score, or another word for `missing`.
         """
         name = Path(self.query.source.name.strip("<>")).stem
-        judged = evaluate(
-            {name: self.query}, self.query.dataset, predictions, distance_m=distance_m, least_score=least_score,
-            missing=missing, simulated=simulated, cluster=cluster, margin=margin, seed=seed,
+        paths = (predictions,) if isinstance(predictions, str | Path) else tuple(predictions)
+        models = name_models([Path(each) for each in paths])
+        judged = evaluate_models(
+            {name: self.query}, self.query.dataset, dict(zip(models, paths, strict=True)), distance_m=distance_m,
+            least_score=least_score, missing=missing, simulated=simulated, cluster=cluster, margin=margin, seed=seed,
         )  # fmt: skip
-        return Judgement(judged, self.query.dataset)
+        first, *others = judged.models.values()
+        return Judgement(judged if others else first, self.query.dataset)
 
     def __repr__(self) -> str:
         """What was asked and, once known, how many results there are."""

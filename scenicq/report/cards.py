@@ -1,4 +1,4 @@
-"""One run of frames as a card of the report: a picture with a slider, and what is said of each frame."""
+"""A run of frames as a card of the report: a picture with a slider, and facts about each frame."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def _told(shot: Shot) -> str:
 
 
 def _inline(card: Card) -> str:
-    """All frames of a run in one picture over one map; the first is shown."""
+    """Draw all frames of a run in one picture over one map; the first is shown."""
     plane, half = plane_of(card.shots[0].label), card.half
     views = [View((shot.label.ego.x, shot.label.ego.y), half) for shot in card.shots]
     boxes = [view.drawn for view in views]
@@ -84,7 +84,7 @@ def _inline(card: Card) -> str:
 
 
 def best_frame(run: FrameRun, shots: Sequence[Shot]) -> int:
-    """Index of the frame in which the farthest of the roles is nearest to the ego, of equal ones the middle one.
+    """Choose the frame in which the farthest role is nearest to the ego; of equal ones the middle one.
 
     Args:
         run: The run.
@@ -97,7 +97,7 @@ def best_frame(run: FrameRun, shots: Sequence[Shot]) -> int:
 
 
 def draw_tile(card: Card, image: str | None = None) -> str:
-    """The best frame of a run as a small picture that leads to the run.
+    """Draw the best frame of a run as a small picture that links to the run.
 
     Args:
         card: What the run's card is made of.
@@ -153,7 +153,7 @@ def _slider(card: Card) -> str:
 
 
 def draw_card(card: Card) -> str:
-    """A card as markup.
+    """Draw a card, as markup.
 
     Args:
         card: What it is made of.

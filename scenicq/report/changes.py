@@ -74,13 +74,13 @@ def _moved(old: Record | None, new: Record | None) -> str:
 
 
 def _silence(record: Record, results: ReadResults) -> str:
-    """Why results do not name what others do; "" where it does not match."""
+    """Why one file does not name a frame that the other does; "" where the frame does not match."""
     first = record.frame if isinstance(record, FrameRecord) else record.frames.first
     return results.completeness.why_silent(record.recording, _start_us(record), first)
 
 
 def changes(before: ReadResults, after: ReadResults) -> list[FrameChange]:
-    """What became of each frame or interval that matches in either, by recording, then time.
+    """Compare two results: what became of each frame or interval that matches in either, by recording and time.
 
     Args:
         before: The results of the first file.
@@ -108,7 +108,7 @@ def changes(before: ReadResults, after: ReadResults) -> list[FrameChange]:
 
 
 def check_complete(found: Sequence[FrameChange], before: ReadResults, after: ReadResults) -> list[Diagnostic]:
-    """Warnings of results that are not complete, or may not be where something hangs on it.
+    """Warn of results that are incomplete, or may be where it matters.
 
     Args:
         found: As `changes` gives them.
@@ -176,7 +176,7 @@ def _objects(change: FrameChange) -> str:
 
 
 def _elsewhere(change: FrameChange) -> str:
-    """What the file in which the frame does not match says of it, or B of an interval that matches in both."""
+    """What the file without the match says of a frame; for an interval that matches in both, what B says."""
     missing_in_a = change.kind == "came" or (change.kind == "undecided" and not change.before)
     return change.why and f"in {'A' if missing_in_a else 'B'} {change.why}"
 
@@ -206,7 +206,7 @@ def changes_text(found: Sequence[FrameChange], *, every: bool = False) -> str:
 
 
 def _section(kind: Kind, found: Sequence[FrameChange]) -> str:
-    """What became of some frames in the same way: why, then which; those in a row alike share an item."""
+    """A section of frames with the same fate: why, then which; neighbours that are alike share an item."""
     causes = Counter(_elsewhere(change) for change in found if change.why)
     told = [(escape(cause), f"{count:,}") for cause, count in causes.most_common()]
     items: list[str] = []

@@ -1,4 +1,4 @@
-"""The distances that a scenario's requirements speak of, as lines with their metres."""
+"""Draw the distances in a scenario's requirements, as lines with their metres."""
 
 # shapely has no type annotations.
 # pyright: reportUnknownMemberType=false, reportUnknownVariableType=false, reportUnknownArgumentType=false
@@ -40,7 +40,7 @@ _LENGTH = 5.0
 
 
 def measured_distances(scenario: Scenario, observed: Observation, bounds: Bounds) -> list[Measured]:
-    """The distances that the author's requirements speak of, as far as both ends are known.
+    """Measure the distances in the program's requirements, as far as both ends are known.
 
     Args:
         scenario: The scenario.
@@ -86,7 +86,7 @@ def _known(node: Node, observed: Observation) -> object:
 
 
 def draw_distances(found: list[Measured], plane: Plane, placement: Placement, size: int) -> str:
-    """Lines between both ends, each with its length beside its middle, or where that of another is not.
+    """Draw a line for each, with its length beside its middle, or where there is room.
 
     Args:
         found: As `measured_distances` gives them.

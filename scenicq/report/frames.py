@@ -1,4 +1,4 @@
-"""What is said of one frame beside its picture: roles, witness, cause, sensor files, as tables of HTML."""
+"""Facts about one frame beside its picture: roles, witness, cause, sensor files, as tables of HTML."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ def _witness(verdict: Match, source: Source, texts: Mapping[str, str]) -> str:
 
 
 def _margins(shot: Shot) -> str:
-    """What a match shows of each feature and requirement, where somebody asked."""
+    """How much is left until each feature and requirement fails, where that was asked for."""
     told = shot.explanation.margins if shot.explanation is not None else ()
     rows = [
         (element("code", escape(each.what)), escape(each.value), escape(each.allowed), escape(each.spare))
@@ -123,7 +123,7 @@ def _cause(shot: Shot) -> str:
 
 
 def badge(verdict: Verdict, otherwise: str) -> str:
-    """A verdict as a mark, which its shape tells as well as its colour.
+    """A verdict as a mark; shape and colour both tell it.
 
     Args:
         verdict: The verdict.
@@ -176,7 +176,7 @@ def _boxes(shot: Shot) -> Iterator[SpaceBox]:
 
 
 def _recorded(recorded: Mapping[str, Recorded]) -> str:
-    """What a match carries of what the program records; of what is null, why."""
+    """The recorded values of a match; for a null, why."""
     rows = [
         (element("code", escape(name)), element("span", escape(show_cell(each.values[0])), class_="where"),
          escape(", ".join(each.lacking)))
@@ -188,7 +188,7 @@ def _recorded(recorded: Mapping[str, Recorded]) -> str:
 def frame_facts(
     shot: Shot, sensors: Sequence[Sensor], texts: Mapping[str, str], recorded: Mapping[str, Recorded] | None = None
 ) -> str:  # fmt: skip
-    """All that is said of a frame.
+    """All facts about a frame.
 
     Args:
         shot: The frame.

@@ -1,4 +1,4 @@
-"""The signs of pictures with their meaning, each drawn as pictures draw it."""
+"""The legend: each sign of pictures with its meaning, drawn as in pictures."""
 
 from __future__ import annotations
 

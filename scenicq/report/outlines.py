@@ -80,7 +80,7 @@ def _visible(pieces: list[Shape]) -> tuple[Shape, ...]:
 
 
 def _ranges(root: Node) -> list[Range] | None:
-    """The random variables of an expression that is affine in each of them; None if it is not."""
+    """The random variables of an expression, if it is affine in each; else None."""
     below: dict[int, frozenset[Identity]] = {}
     found: dict[Identity, Range] = {}
     for node in postorder((root,)):
@@ -106,7 +106,7 @@ def _ranges(root: Node) -> list[Range] | None:
 
 
 def _reach(root: Node, bounds: Bounds) -> tuple[list[Shape], bool] | None:
-    """What a vector expression can be within bounds, and whether that is exact; None if anything."""
+    """The area that a vector expression can reach within bounds, and whether that is exact; None for anywhere."""
     if isinstance(root, PointIn) and isinstance(root.region, Constant):
         return outline(cast(Region, root.region.value), bounds), True
     ranges = _ranges(root)

@@ -1,4 +1,4 @@
-"""What a scenario says of a frame, drawn over it: allowed places and headings, views, hidden points, causes."""
+"""Draw over a frame what a scenario allows: places and headings, views, hidden points, and what excludes it."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def _wedge(role: Role, low: float, high: float, plane: Plane) -> str:
 def draw_overlay(
     scenario: Scenario, broken: tuple[Blame, ...], roles: tuple[Role, ...], plane: Plane, bounds: Bounds
 ) -> str:
-    """Under the boxes: views, where each role may be, which way it may face.
+    """Draw under the boxes: views, where each role may be, which way it may face.
 
     Args:
         scenario: The scenario.
@@ -111,7 +111,7 @@ def _degrees(angle: float) -> str:
 
 
 def draw_witness(verdict: Verdict | None, roles: tuple[Role, ...], plane: Plane, bounds: Bounds) -> str:
-    """The points of a match's witness that are no label object's own position, as crosses."""
+    """Draw the points of a witness that are no label object's position, as crosses."""
     if not isinstance(verdict, Match):
         return ""
     parts: list[str] = []
@@ -129,7 +129,7 @@ def draw_witness(verdict: Verdict | None, roles: tuple[Role, ...], plane: Plane,
 
 
 def draw_blame(broken: tuple[Blame, ...], roles: tuple[Role, ...], plane: Plane) -> str:
-    """Over the boxes: a line between the objects that an excluding requirement speaks of.
+    """Draw over the boxes: a line between the objects of a requirement that excludes the frame.
 
     Args:
         broken: What excludes the frame.

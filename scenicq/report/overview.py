@@ -84,7 +84,7 @@ def funnel_section(funnel: Funnel, cut: str) -> str:
     """How many frames are left after each step.
 
     Args:
-        funnel: Of a query whose results were taken.
+        funnel: The funnel of a query whose results were taken.
         cut: What the results leave out; "" where they are complete.
     """
     recordings = funnel.over_time["recordings"]
@@ -171,7 +171,7 @@ def _shown(name: str, value: Any) -> str:
 
 
 def how_section(query: Query, command: str, elapsed_s: float) -> str:
-    """How to get this report again: the command line, the options, the versions, the dataset.
+    """The section that says how to make this report again: command line, options, versions, dataset.
 
     Args:
         query: The query.

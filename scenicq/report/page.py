@@ -1,4 +1,4 @@
-"""A page that needs nothing but itself: style and script inside, and a policy that lets nothing else run or load."""
+"""A self-contained page: style and script inside, and a policy that lets nothing else run or load."""
 
 from __future__ import annotations
 

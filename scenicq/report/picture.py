@@ -14,6 +14,7 @@ from typing import Literal
 from scenicq.forest.scenario import Scenario
 from scenicq.geometry.shapes import XY, Bounds
 from scenicq.match.verdict import Match, NoMatch, Unknown, Verdict
+from scenicq.query.execution.own_lanes import OwnLanes, show_standing
 from scenicq.query.explain.frame_explanation import Explanation
 from scenicq.report.backdrop import Backdrop
 from scenicq.report.distances import draw_distances, measured_distances
@@ -127,7 +128,7 @@ class View:
 
 
 def view_of(label: Label, roles: tuple[Role, ...], half: float | None = None) -> View:
-    """The surroundings of the ego, so large that every role is seen.
+    """Choose a square around the ego in which every role is seen.
 
     Args:
         label: The label.
@@ -142,7 +143,7 @@ def view_of(label: Label, roles: tuple[Role, ...], half: float | None = None) ->
 
 
 def plane_of(label: Label) -> Plane:
-    """A plane with its origin near the ego, on whole metres."""
+    """Make a plane with its origin near the ego, on whole metres."""
     return Plane((math.floor(label.ego.x), math.floor(label.ego.y)))
 
 
@@ -175,14 +176,14 @@ def _furniture(plane: Plane, view: View) -> str:
 
 
 def ground(plane: Plane, bounds: Bounds) -> str:
-    """What lies under the map, within bounds in metres."""
+    """Draw the ground under the map, within bounds in metres."""
     left, top = plane.at(bounds[0], bounds[3])
     right, bottom = plane.at(bounds[2], bounds[1])
     return element("rect", class_="ground", x=left, y=top, width=right - left, height=bottom - top)
 
 
 def draw_shot(shot: Shot, plane: Plane, view: View, letters: float = LETTERS) -> str:
-    """All of a picture but the map: overlay, boxes, names, scale and north.
+    """Draw all of a picture but the map: overlay, boxes, names, scale and north.
 
     Args:
         shot: The frame.
@@ -240,14 +241,19 @@ def caption(shot: Shot) -> list[tuple[str, str]]:
             lines.append(("unknown", f"unknown ({reason}): {cause.what}"))
         case None:
             pass
-    for role in shot.roles:
+    roles = shot.roles
+    playing = {role.name: role.member.id for role in roles}
+    lanes = {} if shot.scenario is None else OwnLanes(shot.scenario).of_label(label, playing)
+    for role in roles:
         member = role.member
-        lines.append((f"name {role.colour}", f"{role.name} = {member.id} ({member.source_class or member.category})"))
+        told = f"{role.name} = {member.id} ({member.source_class or member.category})"
+        where = f", {show_standing(lanes[role.name])}" if role.name in lanes else ""
+        lines.append((f"name {role.colour}", told + where))
     return lines
 
 
 def stylesheet(*, dark: bool = True) -> str:
-    """The style of pictures; without the rules for dark surroundings for renderers that know no media queries."""
+    """The style of pictures; without the rules for dark mode where a renderer knows no media queries."""
     text = resources.files("scenicq.report").joinpath("assets", "picture.css").read_text(encoding="utf-8")
     return text if dark else text.partition("@media")[0]
 
@@ -262,7 +268,7 @@ def draw(
     captioned: bool = True,
     letters: float = LETTERS,
 ) -> str:
-    """A frame as a file of SVG.
+    """Draw a frame as a file of SVG.
 
     Args:
         shot: The frame.

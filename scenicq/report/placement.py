@@ -1,4 +1,4 @@
-"""Where texts stand in a picture: at that of several spots where they hide least of what is there."""
+"""Choose where texts stand in a picture: at the spot where they hide least."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _OUTSIDE = 99.0
 
 @dataclass(eq=False)
 class Placement:
-    """What texts should not hide; those that have found a place are part of it.
+    """What texts should not hide, placed texts included.
 
     Attributes:
         across, along: Where the picture's sides are, in centimetres.
@@ -41,7 +41,7 @@ class Placement:
         self._taken.append((*center, wide, high, bad))
 
     def place(self, spots: Sequence[Spot], wide: float, high: float, bad: float) -> Spot:
-        """The first of the spots where a text hides least; it is kept from then on.
+        """Place a text at the spot where it hides least, the first of equal ones.
 
         Args:
             spots: Where it may stand, the best first.

@@ -17,7 +17,7 @@ def can_make_png() -> bool:
 
 
 def png(svg: str) -> bytes:
-    """A picture as a PNG file.
+    """Convert a picture to a PNG file.
 
     Args:
         svg: As `scenicq.report.picture.draw` gives it, in the light style.

@@ -22,7 +22,7 @@ class FrameRun:
         results: Their results in order of time, at least one.
         first: Number of the first frame in its recording, from 1.
         of: Frames of the recording.
-        timeline: Of an interval, a picture of what held when.
+        timeline: A picture of what held when in an interval.
     """
 
     recording: str
@@ -44,12 +44,7 @@ class FrameRun:
 
 
 def frame_numbers(dataset: Dataset, recordings: Iterable[str]) -> dict[str, tuple[int, int]]:
-    """For each frame of some recordings its number there, from 1, and how many frames the recording has.
-
-    Args:
-        dataset: The dataset.
-        recordings: Names of recordings.
-    """
+    """For each frame of some recordings its number there, from 1, and how many frames the recording has."""
     wanted = sorted(set(recordings))
     connection = dataset.connect()
     try:

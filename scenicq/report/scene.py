@@ -1,4 +1,4 @@
-"""Who plays whom in a label, and what is drawn of a label's objects."""
+"""Roles in a label, and how its objects are drawn."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class Role:
 
 
 def find_roles(scenario: Scenario, label: Label, correspondence: Mapping[str, str]) -> tuple[Role, ...]:
-    """The roles of a correspondence, in program order; the ego's is there also where the correspondence is empty."""
+    """List the roles of a correspondence in program order; the ego's is there even if the correspondence is empty."""
     known = {member.id: member for member in label.objects} | ({"ego": label.ego} if label.has_ego else {})
     found: list[Role] = []
     for owner in scenario.objects:
@@ -99,7 +99,7 @@ def _told(member: LabelObject, role: str) -> str:
 def draw_object(
     member: LabelObject, plane: Plane, *, role: Role | None = None, blamed: bool = False, least: float = 0.0
 ) -> str:
-    """An object's box with its front marked; what the label does not know is dashed, or a dot without heading.
+    """Draw an object's box with its front marked; unknown sizes are dashed, and an unknown heading makes a dot.
 
     Args:
         member: The object.
@@ -129,7 +129,7 @@ def draw_object(
 
 
 def draw_text(roles: tuple[Role, ...], plane: Plane, placement: Placement, size: int) -> str:
-    """The names of the roles beside their boxes, where they hide least.
+    """Draw the names of the roles beside their boxes, where they hide least.
 
     Args:
         roles: The roles.

@@ -1,4 +1,4 @@
-"""The sensor files of a frame, where they can be found: links that can only open a file, and thumbnails."""
+"""Find the sensor files of a frame: links that can only open a file, and thumbnails."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Sensor:
 
 
 def roots_of(dataset: Dataset, source: Path | None) -> tuple[Path, ...]:
-    """The folders on this machine that the sensor files of a dataset may lie in: its source's, and its own.
+    """The folders on this machine where the sensor files of a dataset may be: its source's, and its own.
 
     Args:
         dataset: The dataset.
@@ -134,7 +134,7 @@ class SensorFiles:
 
 
 def _small(file: Path, size: tuple[int, int]) -> bytes | None:
-    """A small JPEG of an image; None of what is none, is broken, or is too large."""
+    """Make a small JPEG of an image; None if the file is no image, broken, or too large."""
     images: Any = import_module("PIL.Image")
     into = io.BytesIO()
     try:

@@ -29,7 +29,7 @@ class Line:
 
 
 def spans_of(scenario: Scenario) -> dict[str, Span]:
-    """Where the program says what frames are excluded by, in the words in which causes name it."""
+    """Where in the program each cause of exclusion stands, by the name that causes have."""
     found: dict[str, Span] = {}
     for requirement in scenario.requirements:
         if requirement.span is not None:
@@ -55,7 +55,7 @@ def spans_of(scenario: Scenario) -> dict[str, Span]:
 
 
 def program_lines(scenario: Scenario, excluded: Mapping[str, int]) -> tuple[list[Line], dict[str, int]]:
-    """The program's lines with the frames that each excluded, and what no line says.
+    """Share out the excluded frames among the program's lines; the rest is what no line says.
 
     Args:
         scenario: The scenario.

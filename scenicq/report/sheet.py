@@ -21,7 +21,7 @@ _LEAST = 0.006
 
 
 def to_picture(runs: Sequence[FrameRun]) -> frozenset[int]:
-    """Numbers from 1 of the runs that are pictured side by side: first one of each recording, then their next ones.
+    """Choose the runs to picture side by side, by number from 1: first one of each recording, then the next ones.
 
     Args:
         runs: All runs.
@@ -35,11 +35,11 @@ def to_picture(runs: Sequence[FrameRun]) -> frozenset[int]:
 
 
 def tile(run: FrameRun, number: int, best: int, picture: str) -> str:
-    """A run's best frame, small, which leads to the run.
+    """A small picture of a run's best frame, which links to the run.
 
     Args:
         run: The run.
-        number: Of the run, from 1.
+        number: The run's number, from 1.
         best: Index of its best frame.
         picture: Markup of the small picture.
     """

@@ -20,11 +20,11 @@ _WORDS = ("false", "unknown", "true")
 
 
 def interval_runs(query: Query, results: Iterable[Result], numbers: dict[str, tuple[int, int]]) -> Iterator[FrameRun]:
-    """A run for each interval, whose frames have the label objects of the roles.
+    """Make a run for each interval; its frames have the label objects of the roles.
 
     Args:
         query: The query.
-        results: Of intervals.
+        results: Intervals.
         numbers: As `scenicq.report.runs.frame_numbers` gives them.
     """
     for result in results:
@@ -40,7 +40,7 @@ def interval_runs(query: Query, results: Iterable[Result], numbers: dict[str, tu
 
 
 def _at_sample(recorded: Mapping[str, Recorded], place: int) -> Mapping[str, Recorded]:
-    """What is recorded at a sample, and what of the whole interval."""
+    """The recorded values at a sample, and those of the whole interval."""
     return {
         name: Recorded((each.values[place],), series=False) if each.series else each for name, each in recorded.items()
     }

@@ -1,4 +1,4 @@
-"""The report of a query: a page with everything inside up to a few hundred frames, else with pictures beside it."""
+"""Write the report of a query: one page up to a few hundred frames, else with pictures beside it."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ _OWN = ("pictures", "thumbnails", "index.html")
 
 
 def check_target(folder: AnyPath) -> None:
-    """Make sure that a report may be written to a folder: one that is new, empty, or has an older report of ours.
+    """Check that a report may be written to a folder: it must be new, empty, or have an older report of ours.
 
     Elsewhere it must be new: nothing there is replaced in one step but a file.
 
@@ -122,7 +122,7 @@ def write_report(
 
 @contextlib.contextmanager
 def new_report(folder: AnyPath) -> Generator[Path]:
-    """A folder to make a report in, which takes the place of an earlier one when it is complete.
+    """Make a folder for a report; when it is complete, it replaces an earlier one.
 
     Args:
         folder: Where the report shall be.
@@ -158,7 +158,7 @@ def _is_work(path: Path) -> bool:
 
 
 def _leftovers(folder: Path) -> list[Path]:
-    """Where killed runs have worked; whoever writes a report is its only writer."""
+    """Folders that killed runs left; there is only one writer at a time."""
     return [path for path in folder.iterdir() if _is_work(path)]
 
 
@@ -175,7 +175,7 @@ def _replace(work: Path, folder: Path) -> None:
 
 
 def _fitting(results: Sequence[Result], most: int) -> list[Result]:
-    """The first results that have so many frames together at most, and at least one of them."""
+    """The first results with at most so many frames together, at least one result."""
     kept: list[Result] = []
     for each in results:
         most -= 1 if each.interval is None else each.interval.count
@@ -295,7 +295,7 @@ class _Report:
                 yield draw_card(card)
 
     def explained(self, matcher: Matcher, shot: Shot) -> Shot:
-        """A frame with why it matches or does not, but for one within an interval that is no initial scene."""
+        """Explain why a frame matches or does not, unless it is inside an interval and no initial scene."""
         why = None
         match shot.verdict:
             case Match(correspondence):

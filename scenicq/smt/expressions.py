@@ -12,6 +12,7 @@ from typing import cast
 
 from scenicq.forest.bounds import Box, scalar_bounds, vector_bounds
 from scenicq.forest.nodes import (
+    AheadInLanes,
     Among,
     Arithmetic,
     ArithmeticOp,
@@ -175,7 +176,7 @@ class Expressions:
             case Bearing():
                 x, y = cast(TermVector, args[0])
                 return apply(Operator.ATAN2, apply(Operator.NEG, x), y)
-            case CourseCoordinate() | Measure() | LaneCourse() | Corridor():
+            case CourseCoordinate() | Measure() | LaneCourse() | Corridor() | AheadInLanes():
                 raise UnsupportedError("a course that hangs on what no label shows")
             case Among():
                 raise UnsupportedError("a condition on other label objects that hangs on what no label shows")

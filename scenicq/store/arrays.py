@@ -1,4 +1,4 @@
-"""Arrow arrays out of NumPy's, and texts taken from a few.
+"""Make Arrow arrays of NumPy arrays, and of texts that repeat.
 
 pyarrow has all of this, but loads `pyarrow.compute` and `numpy.ma` for it: more time than a small ingest takes.
 """
@@ -36,7 +36,7 @@ def number_array(values: NDArray[Any], kind: Any) -> ArrowArray:
     """Numbers or truth values of shape (n,) as an array of a type that can hold them; nan becomes null.
 
     Args:
-        values: Which the type can hold.
+        values: Numbers that the type can hold.
         kind: A `pyarrow` type of numbers or truth values.
     """
     if values.dtype == np.bool_:
@@ -48,7 +48,7 @@ def number_array(values: NDArray[Any], kind: Any) -> ArrowArray:
 
 
 def lists_at(values: Sequence[Sequence[float]], at: NDArray[np.intp]) -> ArrowArray:
-    """The lists of some numbers, shape (n,), in their order."""
+    """Pick lists by their numbers, shape (n,), in that order."""
     sizes = np.fromiter(map(len, values), np.int64, len(values))
     flat = np.fromiter(chain.from_iterable(values), np.float64, int(sizes.sum()))
     starts, many = np.cumsum(sizes) - sizes, sizes[at]
@@ -63,7 +63,7 @@ def lists_at(values: Sequence[Sequence[float]], at: NDArray[np.intp]) -> ArrowAr
 
 
 class Texts:
-    """Some texts, of which many are taken by their numbers."""
+    """A few texts, from which long columns are made by number."""
 
     def __init__(self, texts: Sequence[str]) -> None:
         """Take the texts."""
@@ -72,7 +72,7 @@ class Texts:
         self._taken = 0
 
     def at(self, numbers: NDArray[np.int64]) -> ArrowArray:
-        """The texts of some numbers, shape (n,), in their order; null for -1."""
+        """Pick texts by their numbers, shape (n,), in that order; null for -1."""
         self._taken += len(numbers)
         if self._taken <= FEW:
             return pa.array(list(map(self._texts.__getitem__, numbers.tolist())), pa.string())
@@ -82,7 +82,7 @@ class Texts:
 
 
 def repeated_texts(texts: Sequence[str], counts: NDArray[np.int64]) -> ArrowArray:
-    """Each text so many times, shape (len(texts),), one after the other."""
+    """Repeat each text as often as `counts` says, one after the other."""
     times = counts.tolist()
     content = "".join(map(mul, texts, times))
     if not content.isascii() or len(content) > MOST_BYTES:

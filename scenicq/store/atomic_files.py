@@ -1,4 +1,4 @@
-"""Files and folders that are there completely or not at all, here or elsewhere (`RemotePath`).
+"""Write files and folders so that they are complete or not there, on this machine or elsewhere (`RemotePath`).
 
 Here they are written under another name, synced, then renamed. Elsewhere they are written in a folder of this machine
 and then sent: a file appears at once, and the last file of a folder when all others are there.
@@ -48,8 +48,8 @@ _STAGE = "scenicq-"
 class WholeFile:
     """A file that gets its name when it is complete.
 
-    What a reader finds under the name is what was there before or all of it, even if the machine stops. `whole_file`
-    is the same as a `with` statement; this is for those who tell errors of the file from those of who writes it.
+    Under the name a reader finds what was there before, or the complete file, even if the machine stops. `whole_file`
+    does the same in a `with` statement; this class tells errors of the file from errors of its writer.
     """
 
     def __init__(self, path: AnyPath, folder: AnyPath | None = None) -> None:
@@ -117,7 +117,7 @@ class WholeFile:
 
 
 def _staying(error: DataError, stage: Path) -> DataError:
-    """The error, with where on this machine lies what could not be sent."""
+    """Add to an error where on this machine the file lies that could not be sent."""
     (told,) = error.diagnostics
     hint = f"what was to be written lies in {stage}, and can be copied there"
     return DataError(replace(told, hints=(*told.hints, hint)))
@@ -125,7 +125,7 @@ def _staying(error: DataError, stage: Path) -> DataError:
 
 @contextmanager
 def whole_file(path: AnyPath) -> Generator[BinaryIO]:
-    """A file to be written, which gets its name at the end of the block unless that fails.
+    """Open a file for writing; it gets its name at the end of the block, unless the block fails.
 
     Raises:
         OSError: It cannot be written.
@@ -159,7 +159,7 @@ def is_taken(path: AnyPath) -> bool:
 
 
 def check_writable(path: AnyPath) -> None:
-    """Find out, before the work, whether a place elsewhere can be written; here, whoever opens a file is told.
+    """Check before the work that a place elsewhere can be written; on this machine, opening a file tells.
 
     Raises:
         DataError: target-unwritable.
@@ -170,7 +170,7 @@ def check_writable(path: AnyPath) -> None:
 
 @contextmanager
 def made_folder(folder: AnyPath) -> Generator[None]:
-    """A folder, made if need be; if the block fails, one that was made and that nothing is in goes again.
+    """Make a folder where there is none; if the block fails, an empty one that was made is removed.
 
     Elsewhere there are no folders but by what is in them.
 
@@ -193,7 +193,7 @@ def made_folder(folder: AnyPath) -> Generator[None]:
 
 @contextmanager
 def whole_folder(path: AnyPath, last: str = COMPLETE) -> Generator[Path]:
-    """A folder to be written, which gets its name at the end of the block unless that fails.
+    """Make a folder to write in; it gets its name at the end of the block, unless the block fails.
 
     Args:
         path: Where it shall be; nothing may be there.
@@ -235,7 +235,7 @@ def whole_folder(path: AnyPath, last: str = COMPLETE) -> Generator[Path]:
 
 @contextmanager
 def _sent_folder(path: RemotePath, last: str) -> Generator[Path]:
-    """A folder of this machine, which is sent at the end of the block unless that fails."""
+    """Make a folder on this machine, and send it at the end of the block, unless the block fails."""
     stage = Path(tempfile.mkdtemp(prefix=_STAGE))
     keep = False
     try:
@@ -282,7 +282,7 @@ def _empty(folder: Path) -> None:
 
 
 class Spare:
-    """An open file of no use, as a context manager: once it is closed, a folder can be listed however few may be open.
+    """A file kept open in reserve: closing it lets a folder be listed where no more files may be opened.
 
     Raises:
         OSError: Too many are open already.
@@ -308,7 +308,7 @@ class Spare:
 
 
 def _locked(handle: int) -> bool:
-    """Lock a folder; also true where its file system has no locks."""
+    """Lock a folder, and say whether it is locked; True also where its file system has no locks."""
     try:
         if fcntl is not None:
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -321,7 +321,7 @@ def _locked(handle: int) -> bool:
 
 @contextmanager
 def sole_writer(folder: AnyPath) -> Generator[None]:
-    """Hold a folder for writing, made if need be, so that a second run is told before it works.
+    """Lock a folder for writing, and make it if need be, so that a second run fails before its work.
 
     The lock goes with the process, however that ends. A folder that was made and that nothing is in is removed again.
     Elsewhere there are no locks.
@@ -353,7 +353,7 @@ def sole_writer(folder: AnyPath) -> Generator[None]:
 
 
 def sync_folder(folder: Path) -> None:
-    """Make renames in a folder last, where the system can: some file systems have no such thing."""
+    """Make renames in a folder survive a stop of the machine, where the file system can."""
     if os.name != "posix":
         return
     with suppress(OSError):

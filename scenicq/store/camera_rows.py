@@ -1,4 +1,4 @@
-"""The cameras of the table `sensors`: rows of them, cameras of rows, and what cameras cannot be."""
+"""Cameras in the table `sensors`: to rows and back, and what makes one unsound."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ LARGEST_IMAGE = 1 << 16
 
 
 def camera_columns(cameras: Sequence[Camera | None]) -> dict[str, list[Any]]:
-    """The columns of some sensor files, of those without a camera too."""
+    """Make the columns of some sensor files, with or without cameras."""
     return {
         "image_width": [None if each is None else each.width for each in cameras],
         "image_height": [None if each is None else each.height for each in cameras],

@@ -1,4 +1,4 @@
-"""The class tree: what the classes of scenarios and of datasets have in common.
+"""The class tree, into which the classes of scenarios and of datasets are translated.
 
 An object of a scenario matches label objects of its class or below. Datasets have names of their own; a taxonomy
 translates them. Nothing here reads a dataset.
@@ -123,7 +123,7 @@ def taxonomy(name: str) -> Mapping[str, str]:
 
 @cache
 def class_matches(wanted: str, category: str, granularity: Granularity) -> bool:
-    """Whether a label object's class plays a role of class `wanted`: it is that class or below, once folded."""
+    """Whether an object of this class can play a role of class `wanted`: both folded, it is that class or below."""
     own = fold(category, granularity) if is_class(category) else category
     role = fold(wanted, granularity) if is_class(wanted) else wanted
     return own == role or (is_class(own) and role in ancestors(own))
@@ -131,7 +131,7 @@ def class_matches(wanted: str, category: str, granularity: Granularity) -> bool:
 
 @cache
 def class_truth(wanted: str, category: str, classes: Granularity) -> int:
-    """Whether a label object of a class is of another: 0 for not, 1 where its class is a coarser one, 2 for surely."""
+    """Whether a label object is of a class: 0 for no, 1 for perhaps, as its own class is coarser, 2 for surely."""
     if not category:
         return 0
     return 2 if class_matches(wanted, category, classes) else int(class_matches(category, wanted, classes))

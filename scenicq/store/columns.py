@@ -1,4 +1,4 @@
-"""The labels of one recording as columns: what importers of large sources make directly, and what rows are made of."""
+"""The labels of one recording as columns: importers make them, and the rows of all tables are made of them."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class MemberColumns:
     roll: NDArray[np.float64] | None = None
 
     def take(self, rows: NDArray[np.int64]) -> MemberColumns:
-        """Those of some rows, in their order."""
+        """Pick some rows, in the given order."""
         return MemberColumns(**{each.name: pick_rows(getattr(self, each.name), rows) for each in fields(self)})
 
 
@@ -74,7 +74,7 @@ class RecordingColumns:
         name, map: As in `Recording`.
         frames, times_us, params: One element a label; `params` are JSON texts, None where there is nothing.
         egos: One a label.
-        objects: Of all labels, those of one label together, in the order of the labels.
+        objects: The objects of all labels, those of one label together, in the order of the labels.
         object_counts, sensor_counts: How many each label has, shape (labels,).
         channels, paths: Sensor files of all labels.
         cameras: The camera of each sensor file, None for what is none or not calibrated; empty where none is.
@@ -110,7 +110,7 @@ class Memberships:
 
 
 def columns_of(recording: Recording) -> RecordingColumns:
-    """The columns of a recording of plain labels."""
+    """Make columns of plain labels."""
     labels = recording.labels
     return RecordingColumns(
         name=recording.name,
@@ -129,7 +129,7 @@ def columns_of(recording: Recording) -> RecordingColumns:
 
 
 def second_of_track(recording: RecordingColumns) -> int | None:
-    """The first row of `objects` whose track another object or the ego of its label has, too; None if there is none."""
+    """Find the first row of `objects` that shares its track with the ego or another object of its label, or None."""
     labels = np.repeat(np.arange(len(recording.object_counts)), recording.object_counts).tolist()
     seen = {(label, track) for label, track in enumerate(recording.egos.track) if track is not None}
     for row, (label, track) in enumerate(zip(labels, recording.objects.track, strict=True)):
@@ -143,7 +143,7 @@ def second_of_track(recording: RecordingColumns) -> int | None:
 def take_labels(
     recording: RecordingColumns, labels: Sequence[int], objects: NDArray[np.bool_], sensors: NDArray[np.bool_]
 ) -> RecordingColumns:
-    """Some labels of a recording, in another order.
+    """Pick some labels of a recording, in a given order.
 
     Args:
         recording: The recording.
@@ -171,7 +171,7 @@ def take_labels(
 
 
 def pick_rows(values: Any, rows: NDArray[np.intp]) -> Any:
-    """The values of some rows of a column, in their order; None where there is no column."""
+    """Pick the values of some rows, in the given order; None where there is no column."""
     if values is None or isinstance(values, np.ndarray):
         return None if values is None else values[rows]
     numbers: list[int] = rows.tolist()

@@ -40,11 +40,11 @@ __all__ = ["Dataset", "DatasetReference", "open_dataset"]
 
 @dataclass(frozen=True, slots=True)
 class DatasetReference:
-    """A dataset as it is named to another process.
+    """What another process needs to open the same version of a dataset.
 
     Attributes:
         address: Where it is.
-        digest: Of its tables.
+        digest: The digest of its tables.
     """
 
     address: str
@@ -54,7 +54,7 @@ class DatasetReference:
         """Open the dataset.
 
         Args:
-            check: As of `open_dataset`.
+            check: As `open_dataset` has it.
 
         Raises:
             DataError: As `open_dataset` does; store-damaged where the dataset there is not the one that was meant.
@@ -128,7 +128,7 @@ class Dataset:
 
     @property
     def maps(self) -> tuple[str, ...]:
-        """Names of the maps, sorted; also of those that labels name but the source has not."""
+        """Names of the maps, sorted, including those that labels name and the source lacks."""
         return tuple(sorted({*self.manifest.maps, *self.manifest.by_map}))
 
     def files(self, table: str) -> tuple[StoreFile, ...]:
@@ -136,7 +136,7 @@ class Dataset:
         return _files(self.place, self.manifest, table)
 
     def scan(self, table: str, part: int | None = None, *, numbered: bool = False) -> str:
-        """What SQL selects from to read a table; see `scans.scan`.
+        """The text that SQL selects from to read a table; see `scans.scan`.
 
         Args:
             table: Name of the table.
@@ -201,10 +201,10 @@ class Dataset:
 
     @contextmanager
     def blamed(self) -> Generator[None]:
-        """Makes what fails because a file has changed say which.
+        """Turn errors in the block that a changed file causes into one that names the file.
 
-        What decodes a damaged file fails in many ways, and later code in many more; so the files are looked at when
-        something has failed, and only then.
+        A damaged file makes its decoder fail in many ways, and later code in many more. So the files are looked at
+        when something has failed, and only then.
 
         Raises:
             DataError: `store-damaged` in place of another error, where a file is not as it was written;
@@ -230,7 +230,7 @@ class Dataset:
             raise
 
     def label(self, frame: str) -> Label:
-        """The label of a frame, which may be named by as much of its name as no other frame has.
+        """Read the label of a frame; the beginning of its name will do if no other frame begins so.
 
         Raises:
             DataError: option-invalid: there is no such frame, or there are several.
@@ -242,28 +242,28 @@ class Dataset:
         return next(self.labels([name]))
 
     def short_names(self) -> ShortNames:
-        """What cuts names of frames and recordings short, as far as they are still found."""
+        """Make the functions that cut names of frames and recordings; the short names are still found."""
         with closing(self.connect()) as connection, self.blamed():
             return shortened(connection)
 
     def labels_at(self, part: int, first: int, end: int, *, motion: bool = True) -> Iterator[Label]:
-        """Labels of one part, in order, as matching sees them: without heights, tilts and cameras.
+        """Read a range of labels of one part, in order, as matching sees them: without heights, tilts and cameras.
 
         Args:
             part: Number of the part.
             first: Row of its labels to begin with.
             end: Row to end before.
-            motion: Whether what is computed of motion is read, too.
+            motion: Whether the observed motion is read, too.
         """
         return self.labels_in(part, np.arange(first, end), motion=motion)
 
     def labels_in(self, part: int, rows: NDArray[np.int64], *, motion: bool = True) -> Iterator[Label]:
-        """Some labels of one part, in order.
+        """Read some labels of one part, in order, as `labels_at` does.
 
         Args:
             part: Number of the part.
             rows: Rows of its labels, in order.
-            motion: Whether what is computed of motion is read, too.
+            motion: Whether the observed motion is read, too.
         """
         labels, objects, sensors = (self.files(table)[part] for table in ("labels", "objects", "sensors"))
         with self.blamed():
@@ -296,9 +296,9 @@ def open_dataset(address: str | Path, *, older: bool = False, check: bool = True
 
     Args:
         address: A folder, or what fsspec understands, such as `s3://bucket/dataset`.
-        older: Whether one of an older version will do, which can only be brought up to date (`rebuild`).
-        check: Whether to read all of it and refuse one that is not sound. Only who knows that it is may do without:
-            what readers do with an unsound one is not defined.
+        older: Whether a dataset of an older version is opened, too; it can only be brought up to date (`rebuild`).
+        check: Whether to read all of it and refuse a dataset that is not sound. Leave it out only where the dataset is
+            known to be sound: what readers do with another is not defined.
 
     Raises:
         DataError: `store-missing`, `store-version`, or `store-damaged` where a file is missing or has another size;

@@ -1,4 +1,4 @@
-"""Where each frame is: the table `frame_index`, sorted by a hash of the frame's name.
+"""The table `frame_index` says where each frame is, sorted by a hash of the frame's name.
 
 Names of frames are often random, so no order of the labels helps to find one; this table does, by its statistics.
 """
@@ -26,7 +26,7 @@ def frame_hashes(frames: Iterable[str]) -> NDArray[np.uint64]:
 
 
 def index_rows(hashes: NDArray[np.uint64]) -> ArrowTable:
-    """The table for frames whose hashes are given in the order of the labels."""
+    """Make the table from the hashes of all frames, in the order of the labels."""
     order = np.argsort(hashes, kind="stable")
     schema = SCHEMAS["frame_index"]
     columns = [number_array(hashes[order], pa.uint64()), number_array(order, pa.int64())]
@@ -34,7 +34,7 @@ def index_rows(hashes: NDArray[np.uint64]) -> ArrowTable:
 
 
 def repeated_rows(hashes: NDArray[np.uint64]) -> NDArray[np.int64]:
-    """Rows whose hash occurs more than once, in order; almost always none."""
+    """Find the rows whose hash occurs more than once, in order; almost always there are none."""
     order = np.argsort(hashes, kind="stable")
     same = hashes[order][1:] == hashes[order][:-1]
     repeated = np.zeros(len(hashes), dtype=bool)
@@ -43,10 +43,10 @@ def repeated_rows(hashes: NDArray[np.uint64]) -> NDArray[np.int64]:
 
 
 def find_rows(files: Sequence[StoreFile], frames: Collection[str]) -> NDArray[np.int64]:
-    """Rows of the labels that may be those of some frames, in order: all that are, and hardly any other.
+    """Find the rows of some frames, in order: all of them, and hardly ever another one with the same hash.
 
     Args:
-        files: Of the table `frame_index`.
+        files: The files of the table `frame_index`.
         frames: Names of frames; those that are not there find nothing.
     """
     wanted = np.sort(frame_hashes(frames))

@@ -1,4 +1,4 @@
-"""Names of frames and recordings, cut short as far as they stay unique, and found again by what is left of them.
+"""Short names of frames and recordings: names are cut as far as they stay unique, and found by their beginnings.
 
 A name may have parts with `/` between them, such as a recording and a time; each part may be cut short by itself.
 """
@@ -22,10 +22,10 @@ _SHOWN = 5
 
 
 def find_frame(connection: duckdb.DuckDBPyConnection, text: str) -> str:
-    """The frame of a name, or of the beginning of one.
+    """Find the frame with a name, or with a name that begins so.
 
     Args:
-        connection: To a dataset.
+        connection: A connection to the dataset.
         text: A name, or as much of it, or of each of its parts, as no other frame has.
 
     Raises:
@@ -47,7 +47,7 @@ def find_frame(connection: duckdb.DuckDBPyConnection, text: str) -> str:
 
 
 def find_recording(recordings: Iterable[str], text: str) -> str | None:
-    """The recording of a name, or of the beginning of one; None if none begins so.
+    """Find the recording with a name, or with a name that begins so; None if there is none.
 
     Args:
         recordings: The names of all.
@@ -69,7 +69,7 @@ def _ambiguous(what: str, text: str, found: Sequence[str]) -> DataError:
 
 @dataclass(frozen=True, slots=True)
 class ShortNames:
-    """What cuts names short, all of a kind to the same length, so that they are still found.
+    """Two functions that cut names: all names of a kind to one length, at which they are still unique.
 
     Attributes:
         frame: Cuts names of frames.
@@ -81,12 +81,12 @@ class ShortNames:
 
 
 def shortened(connection: duckdb.DuckDBPyConnection) -> ShortNames:
-    """What cuts names short so that `find_frame` and `find_recording` still find them.
+    """Make the functions that cut names so that `find_frame` and `find_recording` still find them.
 
     Names of frames that do not all have the same number of parts stay as they are.
 
     Args:
-        connection: To a dataset.
+        connection: A connection to the dataset.
     """
     length = _shortest(connection, "recording")
     rows = connection.execute("SELECT DISTINCT len(string_split(frame, '/')) FROM labels").fetchall()

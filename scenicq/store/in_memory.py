@@ -13,7 +13,7 @@ __all__ = ["connect_in_memory"]
 
 
 def connect_in_memory(config: Mapping[str, bool | int | str] | None = None) -> duckdb.DuckDBPyConnection:
-    """A DuckDB without a file.
+    """Connect to a DuckDB in memory, without a file.
 
     Args:
         config: Settings that DuckDB takes at the start.

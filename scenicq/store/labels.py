@@ -69,6 +69,8 @@ class LabelObject:
         motion: What the store has computed of its track; None for what was not read from a store. It is no part of the
             label, and does not count where labels are compared.
         out_of_plane: Height and tilt; None where nothing of them is known, or was read.
+        last_lane: The number of the last lane of its track among the map's elements, where that tells more of its lanes
+            than its heading does (`scenicq.store.last_lanes`); computed as the motion is.
     """
 
     id: str
@@ -85,6 +87,7 @@ class LabelObject:
     attributes: Mapping[str, str | float | bool] = field(default_factory=dict[str, str | float | bool])
     motion: Motion | None = field(default=None, compare=False)
     out_of_plane: OutOfPlane | None = None
+    last_lane: float | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True, slots=True)

@@ -64,7 +64,7 @@ class Counts(Struct, frozen=True):
 
 
 class LeftOut(Struct, frozen=True):
-    """What is not in the dataset as the source has it.
+    """Something that the dataset lacks, or has otherwise than the source.
 
     Attributes:
         what: "recording", "label", "object", "map element" ...
@@ -87,7 +87,7 @@ class Provenance(Struct, frozen=True):
     Attributes:
         source: The path that was given.
         time: When, in ISO 8601.
-        versions: Of packages; None where one is not known.
+        versions: The versions of packages; None where one is not known.
         options: How the source was read.
         facts: How values were made, as the importer says it.
     """
@@ -173,14 +173,14 @@ def is_dataset(folder: Path) -> bool:
 
 
 def check_path(folder: Path, code: str) -> None:
-    """Refuse a folder whose path is no text: neither Arrow nor DuckDB open files in it.
+    """Refuse a folder whose path is no text: neither Arrow nor DuckDB can open files in it.
 
     Args:
         folder: The folder of a dataset.
         code: The code of the error.
 
     Raises:
-        DataError: It is none, as where a path has bytes that are not UTF-8, or Python takes it for ASCII.
+        DataError: The path has bytes that are not UTF-8, or Python takes it for ASCII.
     """
     try:
         str(folder.absolute()).encode()
@@ -194,7 +194,7 @@ def find_links(folder: Path) -> list[Path]:
     """Folders of a dataset that are links: what is read or written there belongs to somebody else.
 
     Args:
-        folder: Of the dataset, or one in which a dataset grows; it may be a link itself.
+        folder: The dataset's folder, or one in which a dataset grows; it may be a link itself.
     """
     return [folder / name for name in FOLDERS if (folder / name).is_symlink()]
 
@@ -203,7 +203,7 @@ def read_manifest(name: str, data: bytes, *, older: bool = False) -> Manifest:
     """Read a dataset's manifest.
 
     Args:
-        name: Of the dataset, for messages.
+        name: What messages call the dataset.
         data: Content of its `dataset.json`.
         older: Whether a version that `scenicq index` brings up to date will do.
 

@@ -1,4 +1,4 @@
-"""Do a map and the labels on it fit? What is measured of each map, and what most likely is wrong where they do not.
+"""Measure whether a map fits the labels on it, and say what is most likely wrong where it does not.
 
 Vehicles lie on lanes, those that move head along them, a left neighbour lies on the left, lanes are as wide as lanes
 are, and labels lie where the map is. A map that is mirrored, turned, in degrees or elsewhere misses one of these.
@@ -89,7 +89,7 @@ class MapFit:
 
 
 def map_fits(dataset: Dataset) -> list[MapFit]:
-    """What fits of each of the maps with the most labels, by name.
+    """Measure the maps with the most labels, by name.
 
     Raises:
         DataError: A file has changed.
@@ -101,7 +101,7 @@ def map_fits(dataset: Dataset) -> list[MapFit]:
 
 
 def misfits(fits: Sequence[MapFit]) -> tuple[Diagnostic, ...]:
-    """A warning for each map that does not fit."""
+    """Warn of each map that does not fit."""
     return tuple(
         Diagnostic(
             "map-does-not-fit", f"map `{fit.map}`: {_facts(fit)}: {fit.cause}", hints=(fit.hint,), severity="warning"
@@ -132,7 +132,7 @@ def fit_of(name: str, features: Sequence[MapFeature], vehicles: Vehicles) -> Map
     """Measure one map.
 
     Args:
-        name: Of the map.
+        name: The map's name.
         features: Its elements.
         vehicles: Those on it.
     """
@@ -210,7 +210,7 @@ class _Lanes:
         return int(vehicles.moves.sum()) >= _FEWEST
 
     def wrong_side(self) -> float | None:
-        """Share of neighbours that lie on the other side than their key says."""
+        """The share of neighbours that lie on the wrong side."""
         wrong = count = 0
         for feature in self._lanes:
             own = self._lines.get(feature.id)
@@ -276,7 +276,7 @@ _CANDIDATES: Mapping[str, tuple[Callable[[Vehicles], Vehicles], str]] = {
 
 
 def _cause(fit: MapFit, lanes: _Lanes, vehicles: Vehicles) -> tuple[str, str]:
-    """What most likely is wrong, and what mends it; nothing where all fits."""
+    """Say what is most likely wrong, and what mends it; nothing where the map fits."""
     if fit.width_m is not None and fit.width_m < 0.01:
         return (
             "its coordinates are degrees, not metres",

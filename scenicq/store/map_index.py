@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -10,9 +12,12 @@ import shapely
 from numpy.typing import NDArray
 
 from scenicq.geometry.centerlines import centerlines, lane_direction
-from scenicq.geometry.features import MapFeature
+from scenicq.geometry.features import MapFeature, names
+from scenicq.geometry.own_directions import along_centerline
+from scenicq.geometry.road_direction import RoadDirection
 from scenicq.store.arrays import Texts
 from scenicq.store.columns import Memberships
+from scenicq.store.last_lanes import LanePairs, last_lanes
 from scenicq.store.schema import MEMBERSHIP_RADIUS_M
 
 __all__ = ["MapIndex"]
@@ -31,6 +36,7 @@ class MapIndex:
         shapely.prepare(self._shapes)
         self._is_lane = np.array([feature.kind == "lane" for feature in features], dtype=bool)
         self._features = features
+        self._ways: dict[int, RoadDirection | None] = {}
 
     def memberships(self, xy: NDArray[np.float64]) -> Memberships:
         """Regions within `MEMBERSHIP_RADIUS_M` of positions of shape (n, 2)."""
@@ -69,8 +75,61 @@ class MapIndex:
             lane[point[order]] = feature[order]
         return lane
 
+    def last_lanes(
+        self,
+        times_us: NDArray[np.int64],
+        tracks: NDArray[np.int64],
+        xy: NDArray[np.float64],
+        headings: NDArray[np.float64],
+        near: Memberships,
+    ) -> NDArray[np.int64]:
+        """The last lane of each label object's track where it tells more than its heading, as `last_lanes`, else -1.
+
+        Args:
+            times_us: When each is seen, shape (n,).
+            tracks: The number of the track of each; below 0 of what is seen once.
+            xy: Where each is, shape (n, 2).
+            headings: That of each; nan where it is not known.
+            near: The regions near each.
+        """
+        chosen = (near.distance == 0) & self._is_lane[near.feature]
+        pairs = LanePairs(near.point[chosen], near.feature[chosen])
+
+        def ways(member: NDArray[np.int64], lane: NDArray[np.int64]) -> list[tuple[float, ...]]:
+            return self._directions(xy[member], lane)
+
+        return last_lanes(times_us, tracks, headings, pairs, ways, lambda lane: self._continued[lane])
+
+    @cached_property
+    def _continued(self) -> dict[int, frozenset[int]]:
+        """The lanes that each lane continues: itself, and those that lead to it."""
+        lanes = {self._features[number].id: number for number in np.flatnonzero(self._is_lane).tolist()}
+        found = defaultdict[int, set[int]](set)
+        for number in lanes.values():
+            found[number].add(number)
+            for other in names(self._features[number], "successors"):
+                if other in lanes:
+                    found[lanes[other]].add(number)
+            found[number].update(lanes[each] for each in names(self._features[number], "predecessors") if each in lanes)
+        return {number: frozenset(each) for number, each in found.items()}
+
+    def _directions(self, xy: NDArray[np.float64], lanes: NDArray[np.int64]) -> list[tuple[float, ...]]:
+        """The directions of lanes, each at the place of its row."""
+        found: list[tuple[float, ...]] = [()] * len(xy)
+        order = np.argsort(lanes, kind="stable")
+        for rows in np.split(order, np.flatnonzero(np.diff(lanes[order])) + 1) if len(order) else ():
+            number = int(lanes[rows[0]])
+            if number not in self._ways:
+                feature = self._features[number]
+                self._ways[number] = along_centerline(feature.id, feature.shape, centerlines(feature))
+            way = self._ways[number]
+            if way is not None:
+                for row, each in zip(rows.tolist(), way.values_many(xy[rows]), strict=True):
+                    found[row] = each
+        return found
+
     def road_directions(self, xy: NDArray[np.float64]) -> list[tuple[float, ...]]:
-        """The headings that lanes have at positions of shape (n, 2); none where they have none."""
+        """The headings of the lanes at positions of shape (n, 2); none off the lanes."""
         return self._direction.values_many(xy)
 
 

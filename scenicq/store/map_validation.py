@@ -69,7 +69,7 @@ def properties_problem(kind: str, properties: Mapping[str, Any] | None) -> str |
     """What is wrong with the properties of an element of a map; None where nothing is.
 
     Args:
-        kind: Of the element.
+        kind: The element's kind.
         properties: What `json_object` makes of their text.
     """
     if properties is None:

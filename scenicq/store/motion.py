@@ -48,12 +48,12 @@ class MotionColumns:
 
 
 def motion_of(times_us: NDArray[np.int64], members: MemberColumns, tracks: Sequence[str | None]) -> MotionColumns:
-    """The motion of the egos or of the label objects of one recording.
+    """Derive the motion of the egos, or of the label objects, of one recording.
 
     Args:
         times_us: Timestamp of each, shape (n,), ascending.
         members: Their properties.
-        tracks: Which of them are one and the same; None for what is seen only once.
+        tracks: The track of each; None for what is seen only once.
     """
     steps = _Steps.of(times_us, tracks)
     x, y = steps.rate(members.x), steps.rate(members.y)
@@ -68,7 +68,7 @@ def motion_of(times_us: NDArray[np.int64], members: MemberColumns, tracks: Seque
 
 
 def track_numbers(tracks: Sequence[str | None]) -> NDArray[np.int64]:
-    """Numbers of tracks, in the order in which they come first; what has no track is one of its own, below 0."""
+    """Number the tracks in the order in which they first occur; an object without one gets a number below 0."""
     numbers: dict[str, int] = {}
     return np.array(
         [~place if name is None else numbers.setdefault(name, len(numbers)) for place, name in enumerate(tracks)],
@@ -78,7 +78,7 @@ def track_numbers(tracks: Sequence[str | None]) -> NDArray[np.int64]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Steps:
-    """The neighbours of each sample on its track; its own number where there is none near enough."""
+    """The neighbours of each sample on its track, or the sample itself where none is near enough."""
 
     times_us: NDArray[np.int64]
     before: NDArray[np.intp]
@@ -98,7 +98,7 @@ class _Steps:
         return cls(times_us, before, after)
 
     def rate(self, values: Numbers, *, turns: bool = False) -> Numbers:
-        """Change a second of some values, over those neighbours that have one; `turns` for angles."""
+        """The change of some values a second, between the neighbours that have one; `turns` for angles."""
         there = ~np.isnan(values)
         own = np.arange(len(values))
         first = np.where(there[self.before], self.before, own)
@@ -111,10 +111,10 @@ class _Steps:
 
 @np.errstate(over="ignore", invalid="ignore")
 def slopes(times_us: NDArray[np.int64], values: Numbers, tracks: Sequence[str | None]) -> Numbers:
-    """Least-squares slopes of values over the samples around each, a second; nan where a track has too few samples.
+    """Fit a line to the values around each sample: its slope a second, nan where the track has too few samples.
 
     The samples are those of the track that have a value, equally many on both sides, as long as there are any. Values
-    near the end of all numbers have no slope that is one.
+    near the largest floats may have no finite slope.
     """
     known = np.flatnonzero(~np.isnan(values))
     track = track_numbers(tracks)[known]

@@ -1,4 +1,4 @@
-"""What a dataset observes of motion: how much labels say, how much follows from tracks, how often, and gaps."""
+"""Count what is known of motion in a dataset: from labels, from tracks, how often, with which gaps."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _OWNERS = MappingProxyType({"ego": ("labels", "ego_"), "objects": ("objects", ""
 
 @dataclass(frozen=True, slots=True)
 class Known:
-    """For how many egos or label objects a quantity is known.
+    """How many egos or label objects have a quantity, and from where.
 
     Attributes:
         own: From the label itself.

@@ -37,9 +37,9 @@ class TableWriter:
         """Open a file under a temporary name.
 
         Args:
-            folder: Of the dataset.
+            folder: The dataset's folder.
             table: A key of `SCHEMAS`.
-            number: Of the part.
+            number: The part's number.
 
         Raises:
             OSError: The folder cannot be written.

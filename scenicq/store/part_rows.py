@@ -50,7 +50,7 @@ class PartRows:
         self._batches: Iterator[Any] = self._from_group(0)
 
     def take(self, first: int, count: int) -> ArrowTable:
-        """Some rows; those before them, and whole row groups of these unread, are passed over.
+        """Read some rows; those before them are skipped, whole row groups of them unread.
 
         Args:
             first: The first row, not before the end of what was taken before.
@@ -79,7 +79,7 @@ class PartRows:
         return rows.slice(min(first, end) - begin, count)
 
     def runs(self, column: str) -> list[int]:
-        """How many neighbouring rows have the same text, for each run of such rows.
+        """The length of each run of neighbouring rows with the same text.
 
         Args:
             column: A column of texts without null, of which a dictionary is read.

@@ -34,12 +34,12 @@ class Place(Protocol):
 
     @property
     def name(self) -> str:
-        """What it is called in messages: as the user gave it."""
+        """The dataset's name in messages, as the user gave it."""
         ...
 
     @property
     def address(self) -> str:
-        """What finds it from any process that sees the same files."""
+        """An address that any process with the same files can open."""
         ...
 
     def manifest(self) -> bytes:
@@ -51,7 +51,7 @@ class Place(Protocol):
         ...
 
     def problems(self, parts: Iterable[Part]) -> list[Diagnostic]:
-        """What is wrong with files, as far as a glance can tell."""
+        """What is wrong with files, as far as can be told without reading them."""
         ...
 
     def file(self, part: Part) -> StoreFile:
@@ -63,15 +63,15 @@ class Place(Protocol):
         ...
 
     def stamp(self, parts: Iterable[Part]) -> str:
-        """What changes with any file, as far as the place itself can tell without reading them."""
+        """A text that changes with any file, as far as the place can tell without reading them."""
         ...
 
     def failure(self) -> DataError | None:
-        """Why a file could not be read, where whoever read it tells only that; once."""
+        """The last reason why a file could not be read, told once; DuckDB says only that it could not."""
         ...
 
     def admit(self, connection: duckdb.DuckDBPyConnection, parts: Iterable[Part]) -> None:
-        """Make files of the dataset readable for a connection."""
+        """Let a connection read files of the dataset."""
         ...
 
 
@@ -89,7 +89,7 @@ class LocalFolder:
 
     @classmethod
     def at(cls, path: Path) -> Self:
-        """The folder, which is read from now on.
+        """Take a folder, and lock it for reading.
 
         Raises:
             DataError: `store-missing` where its path is no text.
@@ -177,7 +177,7 @@ def _problem(root: Path, part: Part) -> Diagnostic | None:
 
 
 def find_place(address: str | Path) -> Place:
-    """The place of a path, or of an address such as `s3://bucket/dataset`.
+    """Find the place of a path, or of an address such as `s3://bucket/dataset`.
 
     Raises:
         DataError: option-invalid: what the address needs is not installed.
@@ -192,19 +192,19 @@ def stamp_of(place: Place, manifest: Manifest) -> str:
     """A text that changes whenever a file of a dataset may have changed.
 
     Args:
-        place: Of the dataset.
-        manifest: Of the dataset.
+        place: Where the dataset is.
+        manifest: The dataset's manifest.
     """
     every = (part for parts in manifest.tables.values() for part in parts)
     return hashlib.sha256(place.manifest() + place.stamp(every).encode()).hexdigest()
 
 
 def open_parquet(file: StoreFile, **options: Any) -> Any:
-    """A `pyarrow.parquet.ParquetFile` of a file, to be closed.
+    """Open a file as a `pyarrow.parquet.ParquetFile`; the caller closes it.
 
     Args:
         file: The file.
-        options: Of `ParquetFile`.
+        options: What `ParquetFile` takes besides.
     """
     if isinstance(file, Path):
         return pq.ParquetFile(file, **options)

@@ -1,4 +1,4 @@
-"""Who reads a dataset: a shared lock on its folder, so that files of an older version stay as long as they are read.
+"""A shared lock on the folder of a dataset that is read: files of an older version stay until nobody reads them.
 
 The lock is a courtesy. Where there is none (other systems, some network file systems) a reader whose files go away ends
 with an error, never with rows of two versions: a file's name depends on its content.
@@ -24,13 +24,13 @@ _TRIES, _PAUSE_S = 100, 0.01
 
 
 class Reading:
-    """Says that a dataset is read, from the moment it is made until `end`, or until nobody refers to it."""
+    """The lock of one reader, held from the start until `end`, or until nobody refers to it."""
 
     def __init__(self, folder: Path) -> None:
-        """Begin; without a lock where there is none to be had.
+        """Take the lock, if there is one to be had.
 
         Args:
-            folder: Of the dataset.
+            folder: The dataset's folder.
         """
         self._folder = folder
         self._handle: int | None = None
@@ -67,7 +67,7 @@ class Reading:
 
 @contextmanager
 def nobody_reads(folder: Path) -> Generator[bool]:
-    """Whether nobody reads a dataset; then nobody begins to, either, while the block runs.
+    """Whether nobody reads a dataset; if so, nobody can begin to while the block runs.
 
     Raises:
         OSError: The folder cannot be locked.

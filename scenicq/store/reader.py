@@ -1,4 +1,4 @@
-"""From rows back to labels, in batches.
+"""Read labels from rows, in batches.
 
 Parts of one number hold the same recordings, and each row of `labels` says where its rows in the other tables begin; so
 reading needs no join, and of chosen frames only the row groups that hold them are read.
@@ -25,13 +25,24 @@ from scenicq.store.schema import ArrowTable
 if TYPE_CHECKING:
     from scenicq.store.recorded_tracks import RecordedTracks
 
-__all__ = ["EGO_COLUMNS", "LABEL_COLUMNS", "MOTION_COLUMNS", "OBJECT_COLUMNS", "RowFile", "assemble", "read_labels"]
+__all__ = [
+    "EGO_COLUMNS",
+    "LABEL_COLUMNS",
+    "LAST",
+    "MOTION_COLUMNS",
+    "OBJECT_COLUMNS",
+    "RowFile",
+    "assemble",
+    "read_labels",
+]
 
 _BATCH = 2048
 _FEW = 64
 """Texts that are decoded one by one."""
+LAST = "last_lane"
+"""The column of the last lane of a track."""
 OBJECT_COLUMNS = ["id", "class", "source_class", "x", "y", "heading", "width", "length", "height", "vx", "vy"]
-OBJECT_COLUMNS.extend(("track", "attributes"))
+OBJECT_COLUMNS.extend(("track", "attributes", LAST))
 MOTION_COLUMNS = ["motion_vx", "motion_vy", "acceleration", "yaw_rate", "motion_derived"]
 """What is computed of motion; a query that does not ask for it need not read it."""
 EGO_COLUMNS = [f"ego_{name}" for name in OBJECT_COLUMNS[1:]]
@@ -50,7 +61,7 @@ def read_labels(
     space: bool = True,
     recorded: RecordedTracks | None = None,
 ) -> Iterator[Label]:
-    """Labels in the order of the store.
+    """Read labels in the order of the store.
 
     Args:
         parts: Files of the tables `labels`, `objects` and `sensors`, part by part.
@@ -149,14 +160,14 @@ class RowFile:
 def assemble(
     frames: ArrowTable, objects: ArrowTable, sensors: ArrowTable, recorded: RecordedTracks | None = None
 ) -> Iterator[Label]:
-    """Labels from rows.
+    """Make labels of rows.
 
     Args:
         frames: `LABEL_COLUMNS` and `EGO_COLUMNS` of each label; its counts say how many rows of the others are its own.
         objects: `OBJECT_COLUMNS`, label by label; both may have `MOTION_COLUMNS` and `OUT_OF_PLANE`, too, and may lack
             columns of what nobody looks at.
         sensors: Channels and paths, label by label; it may have `CAMERA_COLUMNS`.
-        recorded: As of `read_labels`.
+        recorded: As `read_labels` has it.
     """
     others = _objects([_values(objects, name) for name in OBJECT_COLUMNS], objects, "")
     egos = _objects([["ego"] * len(frames), *(_values(frames, name) for name in EGO_COLUMNS)], frames, "ego_")
@@ -199,13 +210,13 @@ def _spaces(table: ArrowTable, prefix: str) -> Iterable[OutOfPlane | None]:
 
 def _objects(columns: list[list[Any]], table: ArrowTable, prefix: str) -> list[LabelObject]:
     motions, spaces = _motions(table, prefix), _spaces(table, prefix)
-    *before, vx, vy, track, attributes = columns
+    *before, vx, vy, track, attributes, last_lanes = columns
     velocities = [None if x is None else (x, y) for x, y in zip(vx, vy, strict=True)]
-    return [*map(LabelObject, *before, velocities, track, attributes, motions, spaces)]
+    return [*map(LabelObject, *before, velocities, track, attributes, motions, spaces, last_lanes)]
 
 
 def _values(table: ArrowTable, name: str) -> list[Any]:
-    """A column as Python values: null becomes None, JSON what it says; equal JSON texts share one value.
+    """Python values of a column: null becomes None, and JSON is read; equal texts share one value.
 
     A column that was not read is null everywhere.
     """

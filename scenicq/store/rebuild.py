@@ -1,4 +1,4 @@
-"""Computing anew what a dataset's tables hold beside the labels: `scenicq index`.
+"""Compute anew what a dataset's tables hold beside the labels: `scenicq index`.
 
 Labels, objects, sensors and maps stay as they are; lanes, directions, memberships, positions relative to the ego and
 counts come from them. The result is byte for byte that of an ingest.
@@ -41,7 +41,7 @@ _SOURCES = {
 
 
 def rebuild(dataset: Dataset, progress: Callable[[int], None] | None = None) -> Manifest:
-    """Replace a dataset by one whose computed columns are computed anew; all of it or, after an error, nothing.
+    """Compute a dataset's computed columns anew, and replace it; after an error it stays as it was.
 
     Args:
         dataset: The dataset; open it again afterwards.
@@ -88,12 +88,12 @@ def rebuild(dataset: Dataset, progress: Callable[[int], None] | None = None) -> 
 def recordings_of(
     label_rows: ArrowTable, object_rows: ArrowTable, sensor_rows: ArrowTable
 ) -> Iterator[RecordingColumns]:
-    """The recordings of a part, without what is computed.
+    """Read the recordings of a part, without computed columns.
 
     Args:
-        label_rows: Of the table `labels`.
-        object_rows: Of the table `objects`.
-        sensor_rows: Of the table `sensors`.
+        label_rows: Rows of the table `labels`.
+        object_rows: Rows of the table `objects`.
+        sensor_rows: Rows of the table `sensors`.
     """
     names = label_rows["recording"].to_pylist()
     starts = [row for row, name in enumerate(names) if row == 0 or names[row - 1] != name]

@@ -1,4 +1,4 @@
-"""Where the label objects of a recording are in all of its labels: what the courses of its tracks are made of.
+"""Where the label objects of a recording are in all of its labels; courses are made of that.
 
 Read when a course is asked for, a recording at a time; of those asked for last a few are kept.
 """
@@ -48,7 +48,7 @@ class RecordingCourses:
     )
 
     def course(self, network: Network, gap_s: float, track: tuple[str, str], sample: int) -> CoursePlace | None:
-        """The course of a track with where it is at a sample; None if it is not seen there.
+        """Find the course of a track, and its place on it at a sample; None if the track is not seen there.
 
         Args:
             network: The map.
@@ -68,7 +68,7 @@ class RecordedTracks:
     """The recordings of a dataset by name."""
 
     def __init__(self, files: Callable[[str], tuple[StoreFile, ...]]) -> None:
-        """Take what names the files of a table, part by part; none is opened yet."""
+        """Take the function that names the files of a table, part by part; no file is opened yet."""
         self._files = files
         self._runs: dict[str, tuple[int, int, int]] | None = None
         self._open: tuple[int, RowFile, RowFile] | None = None
@@ -94,7 +94,7 @@ class RecordedTracks:
         self, network: Network, gap_s: float, recording: str, frame: str, track: tuple[str, str] | None,
         place: tuple[float, float, float | None],
     ) -> CoursePlace:  # fmt: skip
-        """The course of a label object with where on it the object is.
+        """Find the course of a label object, and its place on it.
 
         Args:
             network: The map.

@@ -115,7 +115,7 @@ class RemoteFolder:
             raise _unreachable(self.name, error) from error
 
     def problems(self, parts: Iterable[Part]) -> list[Diagnostic]:
-        """Nothing: each file would cost a request; what is wrong with one shows when it is read."""
+        """None: asking would cost a request a file, and reading shows what is wrong."""
         return []
 
     def file(self, part: Part) -> RemoteFile:
@@ -162,7 +162,7 @@ class RemoteFolder:
             raise
 
     def failure(self) -> DataError | None:
-        """What went wrong last since somebody asked."""
+        """The last failure since somebody asked, told once."""
         return self._failures.pop() if self._failures else None
 
     def _fetched(self, part: Part, start: int, end: int) -> bytes:
@@ -178,7 +178,7 @@ class RemoteFolder:
         return data
 
     def _ask(self, method: str, path: str, **options: Any) -> Any:
-        """Call a method of the file system; where nothing answers, whatever it would try again ends, too.
+        """Call a method of the file system; where nothing answers in time, its retries end, too.
 
         Raises:
             TimeoutError: After `_PATIENCE_S`.
@@ -221,7 +221,7 @@ def file_system(address: str) -> tuple[Any, str]:
 
 
 def ask(files: Any, method: str, *given: Any, size: int = 0, **options: Any) -> Any:
-    """Call a method of a file system of fsspec; where nothing answers, whatever it would try again ends, too.
+    """Call a method of a file system of fsspec; where nothing answers in time, its retries end, too.
 
     Args:
         files: The file system.
@@ -247,7 +247,7 @@ def _line(error: Exception) -> str:
 
 
 def why_not(what: str, error: Exception) -> tuple[str, tuple[str, ...]]:
-    """A message, and hints: what cannot be done, and why.
+    """Say what cannot be done elsewhere, and why: a message, and hints.
 
     Args:
         what: Such as `s3://bucket/town cannot be read`.

@@ -1,4 +1,4 @@
-"""Files and folders elsewhere that are written, or read as a whole: what a writer asks of a `Path`, over fsspec.
+"""Files and folders elsewhere: the methods of `Path` that writers and readers of whole files use, over fsspec.
 
 An object appears with its whole content or not at all; nothing else is atomic there. Where there are several,
 `atomic_files` writes the last one when all others are there.
@@ -30,7 +30,7 @@ def is_address(text: str) -> bool:
 
 
 def local_path(given: str) -> Path:
-    """The path of a text that is no address."""
+    """Make a path of a text that is no address."""
     if not given.startswith("file://"):
         return Path(given)
     # all of it is the path: a question mark begins no query
@@ -67,7 +67,7 @@ class RemotePath:
 
     @classmethod
     def at(cls, address: str) -> Self:
-        """What an address names.
+        """Take the place that an address names.
 
         Raises:
             DataError: option-invalid.
@@ -102,7 +102,7 @@ class RemotePath:
         return PurePosixPath(self.name).suffix
 
     def with_name(self, name: str) -> RemotePath:
-        """What has another name in the same folder."""
+        """The place with another name in the same folder."""
         cut = len(self.name)
         return RemotePath(f"{self.address[:-cut]}{name}", self.files, f"{self.place[:-cut]}{name}")
 
@@ -159,7 +159,7 @@ class RemotePath:
             raise self._unreachable(error) from error
 
     def put(self, file: Path) -> None:
-        """Give it the content of a file of this machine, all at once.
+        """Send a file of this machine here, all at once.
 
         Raises:
             DataError: target-unwritable.
@@ -170,7 +170,7 @@ class RemotePath:
             raise self._unwritable(error) from error
 
     def check_writable(self) -> None:
-        """Find out, before the work, whether it can be written: an empty file beside it comes and goes.
+        """Check before the work that it can be written: an empty file beside it is made and removed.
 
         Raises:
             DataError: target-unwritable.

@@ -60,7 +60,7 @@ class RowColumns:
         return found
 
     def codes(self, name: str, rows: NDArray[np.int64]) -> tuple[NDArray[np.int32], list[str]]:
-        """Numbers of distinct texts, and these; null has the number behind the last."""
+        """The number of each row's text, and the distinct texts; null has the number after the last."""
         numbers: dict[str, int] = {}
         found = np.empty(len(rows), np.int32)
         for group, part, places in self._groups(rows):

@@ -1,4 +1,4 @@
-"""From the columns of one recording to rows of every table, with what is computed at ingest."""
+"""Make rows of every table from the columns of one recording, with what is computed at ingest."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from scenicq.geometry.angles import normalize_array
 from scenicq.store.arrays import lists_at, number_array, repeated_texts
 from scenicq.store.camera_rows import camera_columns
 from scenicq.store.columns import OUT_OF_PLANE, MemberColumns, Memberships, RecordingColumns
+from scenicq.store.last_lanes import tracks_of_both
 from scenicq.store.motion import motion_of
 from scenicq.store.schema import SCHEMAS, ArrowArray, ArrowTable
 
@@ -28,7 +29,7 @@ __all__ = ["recording_rows"]
 def recording_rows(
     columns: RecordingColumns, index: MapIndex | None, *, first_object: int = 0, first_sensor: int = 0
 ) -> dict[str, ArrowTable]:
-    """Rows of `labels`, `objects`, `memberships` and `sensors`.
+    """Make the rows of `labels`, `objects`, `memberships` and `sensors`.
 
     Args:
         columns: The recording.
@@ -49,6 +50,13 @@ def recording_rows(
     # no motion crosses a label without an ego
     passages = accumulate(int(not category) for category in egos.category)
     one_track = [f"ego {n}" if category else None for n, category in zip(passages, egos.category, strict=True)]
+    last_lane = np.full(len(xy), -1)
+    if index is not None:
+        order = np.concatenate((ego_at, object_at))
+        when, headings = np.concatenate((times, times[label_of])), np.concatenate((egos.heading, objects.heading))
+        tracks = tracks_of_both(one_track, objects.track)
+        by_place = np.argsort(order)
+        last_lane = index.last_lanes(when[by_place], tracks[by_place], xy, headings[by_place], placed.near)
     return {
         "labels": _table(
             "labels",
@@ -61,6 +69,7 @@ def recording_rows(
                 **_motion("ego_", times, egos, one_track),
                 "ego_road_directions": lists_at(placed.directions, placed.place[ego_at]),
                 "ego_lane": _names(index, placed.lane[ego_at]),
+                "ego_last_lane": _known(last_lane[ego_at]),
                 "params": columns.params,
                 "object_count": counts,
                 "first_object": first_object + ends - counts,
@@ -82,6 +91,7 @@ def recording_rows(
                 **_relative(egos, objects, label_of),
                 "road_directions": lists_at(placed.directions, placed.place[object_at]),
                 "lane": _names(index, placed.lane[object_at]),
+                "last_lane": _known(last_lane[object_at]),
             },
         ),
         "memberships": _table("memberships", _memberships(columns, index, placed, ego_at, object_at)),
@@ -105,7 +115,7 @@ class _Placed:
         near: Regions near each.
         lane: Number of the lane of each; -1 for none, shape (n,).
         place: Number of the place of each; who stands at the same place has the same, shape (n,).
-        directions: Of the road at each place.
+        directions: The road's directions at each place.
     """
 
     near: Memberships
@@ -115,7 +125,7 @@ class _Placed:
 
 
 def _placed(index: MapIndex | None, xy: NDArray[np.float64]) -> _Placed:
-    """What a map says of positions (n, 2): asked once for all who stand at the same place."""
+    """Ask a map about positions (n, 2), each distinct one once."""
     n = len(xy)
     if index is None:
         nobody = np.empty(0, dtype=np.int64)
@@ -157,6 +167,11 @@ def _memberships(
 
 def _names(index: MapIndex | None, features: NDArray[np.int64]) -> ArrowArray:
     return pa.nulls(len(features), pa.string()) if index is None else index.ids.at(features)
+
+
+def _known(numbers: NDArray[np.int64]) -> ArrowArray:
+    """Numbers, where they are not negative."""
+    return number_array(np.where(numbers < 0, np.nan, numbers), pa.float64())
 
 
 def _everywhere(text: str, rows: int) -> ArrowArray:

@@ -63,7 +63,7 @@ ROWS = {
 
 
 class RowRule(NamedTuple):
-    """What no row of a table may be.
+    """A rule: a condition that no row of a table may meet.
 
     Attributes:
         table, column: Where a row that breaks it is blamed.

@@ -32,10 +32,10 @@ ArrowTable: TypeAlias = Any
 ArrowArray: TypeAlias = Any
 """A `pyarrow.Array`."""
 
-SCHEMA_VERSION = 5
+SCHEMA_VERSION = 6
 """Changes with every change of a table that a reader could notice."""
 
-UPGRADABLE = frozenset({2, 3, 4})
+UPGRADABLE = frozenset({2, 3, 4, 5})
 """Older versions of which `scenicq index` makes this one: it computes anew what is computed."""
 
 ADDED = {4: frozenset({"z", "pitch", "roll", "image_width", "image_height", "intrinsics", "camera_pose"})}
@@ -92,6 +92,8 @@ SCHEMAS: dict[str, Any] = {
             *_motion("ego_"),
             _required("ego_road_directions", pa.list_(_REAL)),  # * of every lane at the position; empty: undefined
             pa.field("ego_lane", _TEXT),  # * the lane at the position; of several the one with the nearest centreline
+            # * number of the last lane of its track among the map's elements, where that tells more than its heading
+            pa.field("ego_last_lane", _REAL),
             pa.field("params", _TEXT),  # JSON; null where there is none
             _required("object_count", _COUNT),
             _required("first_object", _COUNT),  # where its rows begin in the part of `objects` of the same number
@@ -128,6 +130,7 @@ SCHEMAS: dict[str, Any] = {
             pa.field("relative_heading", _REAL),  # * heading minus the ego's, in (-pi, pi]
             _required("road_directions", pa.list_(_REAL)),  # *
             pa.field("lane", _TEXT),  # *
+            pa.field("last_lane", _REAL),  # *
         ]
     ),
     # * One row for each region near an object's position; the ego's object id is "ego".

@@ -53,7 +53,7 @@ SEGMENT_OBJECTS = 1 << 20
 
 
 class SourceProblem(Struct, frozen=True):
-    """Something of a source that could not be taken as it is, as the importer's report told it.
+    """A problem of the source, as the importer's report told it.
 
     Attributes:
         what, code, name, kept: As in `LeftOut`.
@@ -126,7 +126,7 @@ class Segment(Struct, frozen=True):
         return sum(counts.objects for counts in self.recordings.values())
 
     def part(self, table: str, number: int) -> Part:
-        """Its file of a table, where the segment has that number."""
+        """The segment's file in a table, if it has that number."""
         file = self.files[table]
         return Part(part_path(table, number, file.sha256), file.bytes, file.sha256, file.rows)
 

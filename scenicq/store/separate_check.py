@@ -1,4 +1,4 @@
-"""A dataset looked at in a process of its own, which may die where a library does on what it reads."""
+"""Check a dataset in a process of its own: a damaged file may make a library kill the process."""
 
 from __future__ import annotations
 
@@ -16,9 +16,6 @@ _MEMORY = 6 << 30
 
 def check_apart(dataset: DatasetReference) -> None:
     """Refuse a dataset that is not sound, or that ends the process which reads it.
-
-    Args:
-        dataset: The dataset.
 
     Raises:
         DataError: As `DatasetReference.open` does.

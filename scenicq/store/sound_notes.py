@@ -1,4 +1,4 @@
-"""Notes of datasets that were found to be sound: each is read whole once, and again only when it has changed."""
+"""Notes of which datasets are sound, so that each is read whole once, and again only when it has changed."""
 
 from __future__ import annotations
 
@@ -12,26 +12,26 @@ __all__ = ["SoundNotes"]
 
 
 class SoundNotes:
-    """Which datasets are sound, as this process has found out, or one before it that kept notes in the same folder.
+    """Which datasets this process found sound, or an earlier one with notes in the same folder.
 
-    A folder that cannot be read or written costs no more than that.
+    If the folder cannot be read or written, datasets are only read more often.
     """
 
     def __init__(self, folder: Path | None = None) -> None:
         """Begin with what the folder says.
 
         Args:
-            folder: Of the notes; None for what this process alone has found out.
+            folder: Where the notes are; None for what this process alone has found out.
         """
         self._folder = folder
         self._found: set[str] = set()
 
     def has(self, place: Place, manifest: Manifest) -> bool:
-        """Whether a dataset was found to be sound, and is as it was then.
+        """Whether a dataset was found sound and has not changed since.
 
         Args:
-            place: Of the dataset.
-            manifest: Of the dataset.
+            place: Where the dataset is.
+            manifest: The dataset's manifest.
         """
         stamp = stamp_of(place, manifest)
         with contextlib.suppress(OSError):

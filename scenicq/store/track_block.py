@@ -33,7 +33,7 @@ _CODED = ("class", "attributes")
 
 
 def in_order(numbers: Integers) -> Integers:
-    """The places of numbers that are not negative, in the order of these, equal ones as they stand."""
+    """Sort numbers that are not negative, stably: the place of each, from the least on."""
     # sorting is faster than finding the order
     size = max(len(numbers), 1)
     return np.sort(numbers * size + np.arange(len(numbers))) % size
@@ -63,7 +63,7 @@ class TrackBlock:
         runs: The first and the last label of each recording, the last left out; labels are counted from that of
             `first_label`.
         first_label: Row of the first label in its part.
-        times_us: Of each label, shape (n,).
+        times_us: The timestamp of each label, shape (n,).
         recording_of: The number of the recording of each label, -1 for labels of none.
         object_starts: Where the members that are objects of each label begin, and where the last one's end, shape
             (n + 1,).
@@ -245,14 +245,14 @@ class TrackBlock:
         return self._numbers[name]
 
     def said(self) -> tuple[NDArray[np.int64], list[Mapping[str, Any]]]:
-        """What labels say beside the columns: by member the number of one of the distinct answers, and these."""
+        """Attributes: for each member the number of its attributes, and the distinct ones."""
         if self._said is None:
             codes, texts = self._member_codes("attributes")
             self._said = np.append(codes, len(texts)).astype(np.int64), [*map(json.loads, texts), {}]
         return self._said
 
     def categories(self) -> tuple[NDArray[np.int64], list[str]]:
-        """By member the number of its class, and the classes."""
+        """For each member the number of its class, and the classes."""
         if self._categories is None:
             self._categories = self._member_codes("class")
         return self._categories
@@ -293,14 +293,14 @@ class TrackBlock:
         return bool((self.tracks(members) < len(self.runs) * (len(self._names()[1]) + 1)).all())
 
     def ranks(self, members: Integers) -> Integers:
-        """The order of the tracks of members of one recording by name; all of them have one."""
+        """Order the tracks of members of one recording by name; all members have a track."""
         names = np.array(self._names()[1], dtype=object)
         order = np.empty(len(names) + 1, np.int64)
         order[np.argsort(names, kind="stable")] = np.arange(len(names))
         return order[self.tracks(members) % max(len(names), 1)]
 
     def id_ranks(self) -> Integers:
-        """By member the place of its id among all ids of the block, as texts; shape (m + n + 1,)."""
+        """For each member the rank of its id among all ids of the block, as texts; shape (m + n + 1,)."""
         if self._id_ranks is None:
             names = np.array([*self._objects.texts("id", self._rows), "ego"], dtype=object)
             ranks = np.unique(names, return_inverse=True)[1].astype(np.int64)
@@ -332,7 +332,7 @@ class TrackBlock:
         return [known[each] for each in which.tolist()]
 
     def courses(self, members: Integers, network: Network, gap_s: float) -> list[CoursePlace | None]:
-        """The course of each member with where on it it is; None for nobody.
+        """Find the course of each member, and its place on it; None for nobody.
 
         Args:
             members: The members.

@@ -1,4 +1,4 @@
-"""Recordings by track: the values of each label object over the samples of its recording, as columns."""
+"""A recording by track: the values of each label object over all samples, as columns."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scenicq.geometry.driven_courses import CoursePlace
 from scenicq.geometry.network import Network
 from scenicq.store.dataset import Dataset
-from scenicq.store.reader import MOTION_COLUMNS, RowFile
+from scenicq.store.reader import LAST, MOTION_COLUMNS, RowFile
 from scenicq.store.recorded_tracks import RecordedTracks
 from scenicq.store.schema import ArrowTable
 
@@ -22,7 +22,7 @@ __all__ = ["RecordingTracks", "TrackKey", "TrackReader"]
 TrackKey: TypeAlias = tuple[str, str]
 """("ego", ""), ("track", its name), or ("object", frame and id) for a label object without a track."""
 
-_NUMBERS = ("x", "y", "heading", "width", "length", "height", *MOTION_COLUMNS[:-1])
+_NUMBERS = ("x", "y", "heading", "width", "length", "height", *MOTION_COLUMNS[:-1], LAST)
 Numbers = NDArray[np.float64]
 
 
@@ -31,7 +31,7 @@ class RecordingTracks:
     """One recording by track.
 
     Attributes:
-        name: Of the recording.
+        name: The recording's name.
         frames: Names of its frames, in order of time.
         times_us: Their timestamps, shape (n,).
         labels, objects: Their rows of the tables.
@@ -64,7 +64,7 @@ class RecordingTracks:
         return len(self.frames)
 
     def key(self, name: str) -> TrackKey:
-        """The track of a name, or the label object of it that has no track."""
+        """The track with a name, or the label object with that id that has no track."""
         found = ("track", name)
         if found in self._rows:
             return found
@@ -88,7 +88,7 @@ class RecordingTracks:
         return self._columns[key]
 
     def course(self, track: TrackKey, sample: int, network: Network, gap_s: float) -> CoursePlace | None:
-        """The course of a track with where on it it is at a sample; None if it is not seen there.
+        """Find the course of a track, and its place on it at a sample; None if the track is not seen there.
 
         Args:
             track: The track.
@@ -104,7 +104,7 @@ class RecordingTracks:
         return self.recorded.course(network, gap_s, self.name, self.frames[sample], named, place)
 
     def attributes(self, track: TrackKey) -> list[Mapping[str, Any]]:
-        """What the labels say beside the columns, at each sample; nothing where the track is not observed."""
+        """The attributes at each sample; empty where the track is not observed."""
         if track not in self._said:
             said: list[Mapping[str, Any]] = [{}] * len(self.frames)
             texts = self.labels["ego_attributes"] if track[0] == "ego" else self.objects["attributes"]

@@ -34,7 +34,7 @@ _DICTIONARY_BATCH, _RECORD_BATCH = 2, 3
 
 
 class Bound:
-    """Counts what a file has unpacked to, and refuses it where that is too much."""
+    """A limit on what a file unpacks to: it counts bytes, and refuses the file beyond the limit."""
 
     def __init__(self, file: str | Path, size: int | None = None) -> None:
         """Begin to count.
@@ -60,7 +60,7 @@ class Bound:
         self._bytes += size
 
     def check(self, size: int) -> None:
-        """Refuse what would take so many bytes beside what is counted.
+        """Refuse the file if so many bytes more would be too many.
 
         Raises:
             DataError: file-invalid.
@@ -81,11 +81,11 @@ def text_columns(parquet: Any) -> list[str]:
 
 
 def check_claims(parquet: Any, bound: Bound, columns: Sequence[str] | None = None) -> None:
-    """Refuse a Parquet file that says of itself that its columns are too large.
+    """Refuse a Parquet file whose own metadata say that its columns are too large.
 
     Args:
         parquet: A `pyarrow.parquet.ParquetFile`.
-        bound: Of the file; what is claimed is not counted.
+        bound: The file's bound; what the file claims is not counted.
         columns: Those that are read; all by default.
 
     Raises:
@@ -101,7 +101,7 @@ def check_claims(parquet: Any, bound: Bound, columns: Sequence[str] | None = Non
 
 
 def decoded_bytes(array: Any, record: int = 0) -> int:
-    """About how many bytes an array takes once it is objects of Python; nothing is decoded to tell.
+    """Estimate, without decoding it, how many bytes an array takes as objects of Python.
 
     Args:
         array: A `pyarrow.Array`.
@@ -152,7 +152,7 @@ def feather_batches(data: bytes, bound: Bound) -> tuple[Any, list[Any]]:
 
     Args:
         data: The file.
-        bound: Of the file.
+        bound: The file's bound.
 
     Raises:
         DataError: file-invalid: it unpacks to too much.

@@ -1,4 +1,4 @@
-"""A dataset looked at as data: whether its tables hold what every reader of them takes for granted.
+"""Check that the tables of a dataset hold what every reader of them takes for granted.
 
 Checksums say that files are as they were written, not that who wrote them meant well. Here each table is looked at by
 itself: columns, types, numbers, texts, JSON. `rules` compares tables with each other, `map_validation` looks at
@@ -109,7 +109,7 @@ def check_table(table: str, file: StoreFile, name: str, kept: Collection[str]) -
 
 @contextmanager
 def decoding(name: str) -> Generator[None]:
-    """Refuse a file of which a library says that it cannot be decoded.
+    """Refuse the file if a library cannot decode it in the block.
 
     Args:
         name: What it is called in the dataset.
@@ -126,7 +126,7 @@ def decoding(name: str) -> Generator[None]:
 
 
 def check_columns(parquet: Any, fields: Sequence[Any], names: Sequence[str], name: str) -> None:
-    """Look at what a file says of itself, before anything is decoded.
+    """Check the metadata of a file, before anything is decoded.
 
     Args:
         parquet: A `pyarrow.parquet.ParquetFile`.

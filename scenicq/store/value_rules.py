@@ -1,4 +1,4 @@
-"""What the values of a dataset must be, column by column: one table for who writes one and who reads a stranger's.
+"""Rules for the values of each column: one table for writers, and for readers of a stranger's dataset.
 
 `validation` holds the columns of Parquet files to it, an ingest what it has read, before anything is written.
 """
@@ -58,7 +58,7 @@ def longest_text(column: str) -> int:
 
 
 def unsound_reals(column: str, values: NDArray[np.float64]) -> Iterator[tuple[NDArray[np.bool_], str]]:
-    """Which values of a column are none, and what is wrong with them.
+    """Find the values of a column that break a rule.
 
     Args:
         column: Its name.
@@ -77,7 +77,7 @@ def unsound_reals(column: str, values: NDArray[np.float64]) -> Iterator[tuple[ND
 
 
 def plain_object_problem(text: str) -> str | None:
-    """Why a text is no JSON object of plain values; None where it is one."""
+    """Say why a text is no JSON object of plain values; None where it is one."""
     values = json_object(text)
     if values is None:
         return "is no JSON object of finite numbers"
@@ -113,7 +113,7 @@ def _whole(text: str) -> int:
 
 @dataclass(slots=True)
 class Problems:
-    """What a recording has that no dataset may have.
+    """What is unsound in a recording.
 
     Attributes:
         labels, objects, sensors: The fact for each row that is unsound, of those with several the first one.
@@ -129,7 +129,7 @@ class Problems:
 
 
 def find_problems(recording: RecordingColumns) -> Problems:
-    """What a recording has that no dataset may have; what is wrong with an ego is wrong with its label."""
+    """Find what is unsound in a recording; an unsound ego makes its label unsound."""
     found = Problems()
     for name in TEXT_KEYS & {"recording", "map"}:
         text = recording.name if name == "recording" else recording.map

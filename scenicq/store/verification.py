@@ -1,4 +1,4 @@
-"""What is computed at ingest computed again and compared: the prefilter believes it, and a stranger may have lied."""
+"""Compute again what an ingest computes, and compare: the prefilter relies on it, and a stranger may have lied."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _CLOSE = 1e-6
 
 
 def verify_computed(dataset: Dataset) -> None:
-    """Compute all again that follows from labels and maps; the dataset must be sound otherwise.
+    """Compute everything again that follows from labels and maps; the dataset must be sound otherwise.
 
     Raises:
         DataError: dataset-invalid: a table says something else.

@@ -1,4 +1,4 @@
-"""Well-known binary looked at before a geometry library sees it: kinds, nesting, counts and coordinates.
+"""Check well-known binary before a geometry library sees it: kinds, nesting, counts and coordinates.
 
 A library may read a hostile text recursively, or allocate what a count announces; what passes here it can read safely.
 """
@@ -22,7 +22,7 @@ _FEWEST = {_LINE: 2, _POLYGON: 4}
 
 
 def wkb_problem(data: bytes, *, lines: bool) -> str | None:
-    """What keeps a text from being lines or polygons in the plane; None where nothing does.
+    """Say why a text is not lines or polygons in the plane; None where it is.
 
     Args:
         data: The text.

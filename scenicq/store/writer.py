@@ -1,4 +1,4 @@
-"""Writing a dataset: beside its target, then moved there, so that a target is a whole dataset or nothing.
+"""Write a dataset beside its target, then move it there, so that the target is a whole dataset or nothing.
 
 The same recordings and maps give byte-identical files but for the manifest's `provenance`.
 """

@@ -27,6 +27,7 @@ from scenicq.forest.interpret import OnMap, Steps, interpret, steps_of
 from scenicq.forest.nodes import (
     COURSE,
     GOING,
+    LAST_LANE,
     PAST,
     Among,
     DirectionAt,
@@ -410,7 +411,7 @@ class AtomColumns:
                 self._features[key] = column_of(seen)
             else:
                 # who is there without a heading may go any way
-                there = self._seen(node.object, "position") if node.property == GOING else None
+                there = self._seen(node.object, "position") if node.property in (GOING, LAST_LANE) else None
                 told = there[0] if isinstance(there, tuple) else seen[0]
                 status = np.where(np.isnan(told), UNOBSERVED, DEFINED)
                 self._features[key] = Column((seen[0], seen[1]) if len(seen) == 2 else seen[0], status)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.forest.groups import PARAMS
-from scenicq.forest.nodes import COURSE, GOING, Node
+from scenicq.forest.nodes import COURSE, GOING, LAST_LANE, Node
 from scenicq.forest.walk import features
 from scenicq.temporal.samples import BoundSamples, is_moving
 
@@ -55,7 +55,7 @@ def observes(
 
 
 def _present(places: BoundSamples, index: int, name: str) -> NDArray[np.bool_]:
-    if name in (COURSE, GOING):  # whoever is observed has one, if only that it has no heading
+    if name in (COURSE, GOING, LAST_LANE):  # whoever is observed has one, if only that it has no heading
         return places.members[index] >= 0
     found = places.observed(index, name)
     if found is None:

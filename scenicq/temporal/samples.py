@@ -14,14 +14,15 @@ from numpy.typing import NDArray
 from scenicq.forest.among import LabelElements
 from scenicq.forest.columns import DEFINED, UNKNOWN, Column, column_of
 from scenicq.forest.ego_frame import PLACE
-from scenicq.forest.nodes import CLOCK, COURSE, GOING, PAST, RANK, TRACK, WHO, LaneCourse, Value
+from scenicq.forest.nodes import CLOCK, COURSE, GOING, LAST_LANE, PAST, RANK, TRACK, WHO, LaneCourse, Value
 from scenicq.store.classes import Granularity, class_truth
+from scenicq.store.reader import LAST
 from scenicq.store.track_block import TrackBlock
 from scenicq.store.tracks import RecordingTracks, TrackKey
 
 __all__ = ["FIXED", "MOVING", "WITH_COLUMNS", "Binding", "BoundSamples", "Observed", "Samples", "is_moving"]
 
-MOVING = WHO | {"position", "heading", "velocity", "speed", "angularSpeed", "acceleration", COURSE, GOING}
+MOVING = WHO | {"position", "heading", "velocity", "speed", "angularSpeed", "acceleration", COURSE, GOING, LAST_LANE}
 """Properties that change from sample to sample: where they are not observed, nothing is known of them."""
 
 
@@ -247,6 +248,8 @@ def _observed(
         return (np.hypot(vx, vy),) if name == "speed" else (vx, vy)
     if name == GOING:
         return (column("heading"),)
+    if name == LAST_LANE:
+        return (column(LAST),)
     if name in _COLUMNS:
         found = column(_COLUMNS[name])
         return None if name not in MOVING and np.isnan(found).all() else (found,)

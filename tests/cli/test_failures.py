@@ -144,7 +144,7 @@ def _limited(limits, words, folder, dataset):
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.one_in(8)
 def test_two_gigabytes_of_address_space_are_enough(way, command, crossroads, tmp_path):
-    """As README.md says."""
+    """As `scenicq/docs/limits.md` says."""
     done = _limited([("RLIMIT_AS", 2 * 10**9)], [command, *WAYS[way]], tmp_path, crossroads)
     assert (done.returncode, done.stderr) == (0, "")
 

@@ -1,4 +1,4 @@
-"""What the command keeps in the user's own folders: where the README says, or nowhere."""
+"""What the command keeps in the user's own folders: where `cli/README.md` says, or nowhere."""
 
 import os
 import subprocess

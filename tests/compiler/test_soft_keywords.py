@@ -28,6 +28,7 @@ SCENE = "in Scenic the word always stands for the ego or workspace of the scene;
 TAKEN = "an attribute of Scenic's own objects, which no property may hide; here it is a property like others"
 DIFFERENT: dict[tuple[str, str], str] = {
     ("mutate", "a statement of its own"): SHADOWED,
+    ("record", "a call as a statement"): SHADOWED,
     ("param", "a call as a statement"): "here a name that is called is a function, as in Python",
     ("ego", "class"): SCENE,
     ("ego", "keyword argument"): SCENE,

@@ -1,8 +1,9 @@
 """Whether the package runs with the lowest and the newest versions of its dependencies, as pyproject.toml says.
 
-In an environment of its own, without pandas, the installed command answers as in the development environment, byte by
-byte; Parquet, whose bytes name the version that wrote them, row by row. The lowest versions are the lower bounds of
-`pyproject.toml`, which alone names them; those of extras must resolve.
+In an environment of its own, without pandas, the source archive (with the lowest) or the wheel (with the newest) is
+installed. Its command answers as in the development environment, byte by byte; Parquet, whose bytes name the version
+that wrote them, row by row. The lowest versions are the lower bounds of `pyproject.toml`, which alone names them; those
+of extras must resolve.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pyarrow.parquet as pq
+from archives import build_archives
 from packaging.requirements import Requirement
 
 ROOT = Path(__file__).parents[2]
@@ -100,12 +102,10 @@ def make_environment(folder: Path, *, lowest: bool, pre: bool) -> Path:
     bin_ = folder / ("Scripts" if os.name == "nt" else "bin")
     pip = (bin_ / "python", "-m", "pip", "--disable-pip-version-check")
     must(*pip, "install", "-q", "--prefer-binary", *["--pre"] * pre, *requirements(lowest))
-    with tempfile.TemporaryDirectory() as copy:
-        for name in ("pyproject.toml", "README.md", "LICENSE", "scenicq", "cli"):
-            source = ROOT / name
-            copied = shutil.copytree if source.is_dir() else shutil.copyfile
-            copied(source, Path(copy) / name)
-        must(*pip, "install", "-q", "--no-deps", copy)
+    with tempfile.TemporaryDirectory() as scratch:
+        archive, wheel = build_archives(Path(scratch))
+        # the one is installed from its own bytes, the other from those of the wheel that is made of it
+        must(*pip, "install", "-q", "--no-deps", archive if lowest else wheel)
     found = {each["name"].lower(): each["version"] for each in json.loads(must(*pip, "list", "--format", "json"))}
     assert "pandas" not in found, "pandas is what some packages need without saying so"
     must(*pip, "check")
@@ -116,7 +116,8 @@ def make_environment(folder: Path, *, lowest: bool, pre: bool) -> Path:
             str(each),
             found[each.name.lower()],
         )
-    print(", ".join(f"{each.name} {found[each.name.lower()]}" for each in mine), flush=True)
+    versions = ", ".join(f"{each.name} {found[each.name.lower()]}" for each in mine)
+    print(f"{'oldest' if lowest else 'newest'}: {versions}", flush=True)
     if lowest:
         extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
         for name in EXTRAS:
@@ -150,27 +151,40 @@ def answers(bin_: Path, folder: Path, town: Path) -> dict[str, object]:
     return found
 
 
+def differing(expected: dict[str, object], found: dict[str, object], name: str) -> list[str]:
+    """What is answered otherwise in an environment, told."""
+    differ = [what for what in expected | found if expected.get(what) != found.get(what)]
+    for what in differ:
+        print(f"differs: {what}\n  here   {str(expected.get(what))[:2000]}\n  {name} {str(found.get(what))[:2000]}")
+    return differ
+
+
 def main() -> None:
     """Compare; exit with 1 where an answer differs."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("which", choices=("oldest", "newest"))
+    parser.add_argument("which", nargs="+", choices=("oldest", "newest"))
     parser.add_argument("--pre", action="store_true", help="pre-releases, too")
     given = parser.parse_args()
-    bin_ = make_environment(ROOT / f".venv-{given.which}", lowest=given.which == "oldest", pre=given.pre)
     here = Path(sys.executable).parent
-    with tempfile.TemporaryDirectory() as scratch, ThreadPoolExecutor(2) as pool:
+    with tempfile.TemporaryDirectory() as scratch, ThreadPoolExecutor(1 + len(given.which)) as pool:
         town = Path(scratch, "of-all")
         must(here / "scenicq", "ingest", SAMPLES / "crossroads", town, "-q")
+
+        def there(which: str) -> dict[str, object]:
+            bin_ = make_environment(ROOT / f".venv-{which}", lowest=which == "oldest", pre=given.pre)
+            return answers(bin_, Path(scratch, which), town)
+
         ours = pool.submit(answers, here, Path(scratch, "here"), town)
-        theirs = pool.submit(answers, bin_, Path(scratch, "there"), town)
-        expected, found = ours.result(), theirs.result()
-    differing = [what for what in expected | found if expected.get(what) != found.get(what)]
-    for what in differing:
-        print(f"differs: {what}\n  here   {str(expected.get(what))[:2000]}\n  there  {str(found.get(what))[:2000]}")
+        theirs = {which: pool.submit(there, which) for which in given.which}
+        expected = ours.result()
+        found = {which: each.result() for which, each in theirs.items()}
     codes = {what: value[0] for what, value in expected.items() if isinstance(value[0], int)}
     wrong = [what for what, code in codes.items() if (code != 0) != (what in ("match", ""))]
-    print(f"{len(expected)} answers, {len(differing)} differ" + (f"; no answers: {wrong}" if wrong else ""))
-    sys.exit(bool(differing or wrong))
+    told = f"; no answers: {wrong}" if wrong else ""
+    differ = {which: differing(expected, each, which) for which, each in found.items()}
+    for which, those in differ.items():
+        print(f"{which}: {len(expected)} answers, {len(those)} differ{told}")
+    sys.exit(bool(any(differ.values()) or wrong))
 
 
 if __name__ == "__main__":

@@ -217,7 +217,8 @@ def test_pages(judged: Evaluation, street: Dataset, tmp_path: Path) -> None:
     assert text.index('id="frame-0-0"') < text.index('id="frame-0-1"')
     assert f'href="#frame-0-0">{worst.frame}<' in text
     assert "1 false box<" in text
-    drawn = 2 + len(judged.scenarios[0].slices)
+    (balance,) = judged.scenarios[0].balances
+    drawn = 2 + len(judged.scenarios[0].slices) + sum(len(each.parts) for each in balance.covariates)
     assert text.count('class="whiskers"') == drawn
     assert text.count('class="own rate"') == drawn
     assert "Scenarios" not in text
@@ -346,13 +347,13 @@ def test_objects_of_roles_that_do_not_count_are_told(
 def test_simulated_runs(tmp_path: Path) -> None:
     file = tmp_path / "runs.csv"
     file.write_text("scenario,failed\na,1\na,0\na,true\nb,no\n")
-    found = read_simulated(file)
+    found = {name: each.share for name, each in read_simulated(file).items()}
     assert found["a"].rate == pytest.approx(2 / 3)
     assert found["b"].rate == 0
     file.write_text("scenario,score\na,0.25\na,0.75\n")
-    assert read_simulated(file)["a"].rate == pytest.approx(0.5)
+    assert read_simulated(file)["a"].share.rate == pytest.approx(0.5)
     file.write_text("scenario,failed\n" + "a,1\na,0\n" * 60_000)
-    found = read_simulated(file)
+    found = {name: each.share for name, each in read_simulated(file).items()}
     assert (found["a"].of, found["a"].rate) == (120_000, 0.5)
     assert found["a"].interval == pytest.approx((0.4972, 0.5028), abs=1e-4)
     endless = f"scenario,failed\na,1\n{'a' * 200_000},1\n"

@@ -33,8 +33,8 @@ def hostile(crossroads: Path, tmp_path: Path):
     return lambda kind: make_hostile(crossroads, tmp_path / "hostile", KINDS[kind]) and tmp_path / "hostile"
 
 
-def test_there_are_as_many_kinds_of_damage_as_the_map_of_the_code_says():
-    text = (Path(__file__).parents[2] / "scenicq/README.md").read_text()
+def test_there_are_as_many_kinds_of_damage_as_the_decisions_say():
+    text = (Path(__file__).parents[2] / "scenicq/decisions/testing.md").read_text()
     assert f"{len(KINDS)} kinds of damage" in text
     assert len(COMMANDS) == 9
     assert "read in nine ways" in text

@@ -1,4 +1,4 @@
-"""What an older version wrote of `sample_data` is read: a dataset of `nuscenes_tiny`, results on `crossroads`."""
+"""What older versions wrote of `sample_data` is read: datasets of `nuscenes_tiny`, results on `crossroads`."""
 
 from __future__ import annotations
 
@@ -23,13 +23,14 @@ def tables(folder: Path) -> dict[str, bytes]:
     return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*.parquet"))}
 
 
-def test_a_dataset_is_refused_with_what_brings_it_up_and_what_it_says_is_kept(run, tmp_path):
+@pytest.mark.parametrize("name", ["tiny", "tiny5"])
+def test_a_dataset_is_refused_with_what_brings_it_up_and_what_it_says_is_kept(run, tmp_path, name):
     with pytest.raises(DataError, match="`scenicq index"):
-        open_dataset(OLDER / "tiny", check=True)
-    said = json.loads((OLDER / "tiny" / "dataset.json").read_text())
-    older = open_dataset(OLDER / "tiny", older=True, check=False)
+        open_dataset(OLDER / name, check=True)
+    said = json.loads((OLDER / name / "dataset.json").read_text())
+    older = open_dataset(OLDER / name, older=True, check=False)
     assert json.loads(older.manifest.to_json()) == said
-    shutil.copytree(OLDER / "tiny", tmp_path / "d")
+    shutil.copytree(OLDER / name, tmp_path / "d")
     assert run("index", tmp_path / "d").exit_code == 0
     dataset = open_dataset(tmp_path / "d", check=True)
     dataset.verify()
@@ -38,8 +39,9 @@ def test_a_dataset_is_refused_with_what_brings_it_up_and_what_it_says_is_kept(ru
     assert len(list(dataset.labels())) == said["total"]["frames"] == 6
 
 
-def test_index_makes_of_it_what_an_ingest_makes(run, tmp_path):
-    shutil.copytree(OLDER / "tiny", tmp_path / "d")
+@pytest.mark.parametrize("name", ["tiny", "tiny5"])
+def test_index_makes_of_it_what_an_ingest_makes(run, tmp_path, name):
+    shutil.copytree(OLDER / name, tmp_path / "d")
     assert run("index", tmp_path / "d").exit_code == 0
     assert run("info", tmp_path / "d", "--verify").exit_code == 0
     ingest(SAMPLES / "nuscenes_tiny", tmp_path / "new")

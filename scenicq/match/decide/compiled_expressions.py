@@ -15,6 +15,7 @@ from scenicq.forest.groups import PARAMS
 from scenicq.forest.kinds import as_kind
 from scenicq.forest.nodes import (
     GOING,
+    LAST_LANE,
     Arithmetic,
     ArithmeticOp,
     Bearing,
@@ -54,6 +55,7 @@ from scenicq.match.linear.affine_reach import ends
 __all__ = ["VECTORS", "CompiledExpressions", "element_field", "truth"]
 
 _NUMBERS = frozenset({"heading", "width", "length", "height", "speed"})
+_WAYS = frozenset({GOING, LAST_LANE})
 VECTORS = frozenset({"position", "velocity"})
 """Properties that are numbers and pairs wherever they are observed."""
 
@@ -100,24 +102,28 @@ def _constant(value: Value) -> Callable[[Get], Value]:
     return lambda _: value
 
 
-def _element_at(field: ElementAtPoint, point: CompiledVector, going: Callable[[Get], Value] | None) -> Scalar:
+def _element_at(field: ElementAtPoint, point: CompiledVector, going: Sequence[Callable[[Get], Value]]) -> Scalar:
     """The number, as an angle, of the element that lies at a point; of columns, a column.
 
     Args:
         field: The field.
         point: The point.
-        going: The heading of who is there, where it matters; where there is none, None and in columns nan.
+        going: The heading of who is there and the last lane of its track, where they matter; where there is none, None
+            and in columns nan.
     """
 
     def angle(get: Get) -> float:
         x, y = point(get)
-        way = None if going is None else going(get)
+        way, last = [each(get) for each in going] or (None, None)
         if isinstance(get, Columns):
             xy = np.column_stack([np.broadcast_to(np.asarray(each), get.size) for each in (x, y)])
             if isinstance(way, np.ndarray):
-                return cast(float, np.array(field.along_many(xy, way.tolist())))
+                before = last if isinstance(last, np.ndarray) else np.full(len(xy), np.nan)
+                return cast(float, np.array(field.along_many(xy, way.tolist(), before.tolist())))
             return cast(float, np.array([each for (each,) in field.values_many(xy)]))
-        return field.along(x, y, way) if isinstance(way, float) else field.values(x, y)[0]
+        if not isinstance(way, float):
+            return field.values(x, y)[0]
+        return field.along(x, y, way, last if isinstance(last, float) else math.nan)
 
     return angle
 
@@ -128,12 +134,11 @@ def _computed(node: Node, args: Sequence[Callable[[Get], Value]]) -> Callable[[G
         case Constant():
             return _constant(node.value)
         case DirectionAt() if (field := element_field(node)) is not None:
-            place, way = cast(CompiledVector, args[1]), args[2] if node.going else None
-            return cast("Callable[[Get], Value]", _element_at(field, place, way))
+            return cast("Callable[[Get], Value]", _element_at(field, cast(CompiledVector, args[1]), args[2:]))
         case Select():
             which, *options = args
             return lambda get: options[int(cast(float, which(get)))](get)
-        case Feature(object=index, property=name) if name in VECTORS | _NUMBERS | {GOING}:
+        case Feature(object=index, property=name) if name in VECTORS | _NUMBERS | _WAYS:
             return lambda get: get(index, name)
         case Feature(object=index, property=name):
 
@@ -257,15 +262,15 @@ def _exact(node: Node, args: list[Exact | None]) -> Exact | None:
             return (lambda _: value) if isinstance(value, float | tuple) else None
         case Feature():
             index, name = node.object, node.property
-            fits = name in (VECTORS if node.kind == "vector" else _NUMBERS) or name == GOING
+            fits = name in (VECTORS if node.kind == "vector" else _NUMBERS) or name in _WAYS
 
             def observed(get: Get) -> Value:
                 return get(index, name)
 
             return cast(Exact, observed) if fits else None
         case DirectionAt() if (field := element_field(node)) is not None and None not in args[1:]:
-            way = cast("Callable[[Get], Value]", args[2]) if node.going else None
-            return cast(Exact, _element_at(field, cast(CompiledVector, args[1]), way))
+            ways = cast("list[Callable[[Get], Value]]", args[2:])
+            return cast(Exact, _element_at(field, cast(CompiledVector, args[1]), ways))
         case _ if any(arg is None for arg in args):
             return None
         case Arithmetic():

@@ -14,7 +14,7 @@ from scenicq.forest.among import asks_others
 from scenicq.forest.collisions import apart, boxes
 from scenicq.forest.condition import expand
 from scenicq.forest.groups import PARAMS, Comparison, Condition, Constraint, Group, group_constraints
-from scenicq.forest.nodes import COURSE, GOING, WHO, Among, Feature, Node
+from scenicq.forest.nodes import COURSE, GOING, LAST_LANE, WHO, Among, Feature, Node
 from scenicq.forest.scenario import BuiltIn, Requirement, Scenario, ScenarioObject
 from scenicq.forest.unobserved import MOTION, certain_and_possible, is_open, with_any_value
 from scenicq.forest.walk import features, postorder
@@ -55,7 +55,7 @@ def _definition(scenario: Scenario, signature: Signature, feature: Feature, *, n
     None for one that is, and for how an object moves, which is only ever observed.
     """
     owner = scenario.objects[feature.object]
-    said = "heading" if feature.property == GOING else feature.property
+    said = "heading" if feature.property in (GOING, LAST_LANE) else feature.property
     hidden = said in owner.mutated and not noisy
     if feature.property in (*MOTION, *WHO) or (feature.property in signature[feature.object] and not hidden):
         return None

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from functools import lru_cache
 
-from scenicq.forest.nodes import COURSE, GOING, LaneCourse, Value
+from scenicq.forest.nodes import COURSE, GOING, LAST_LANE, LaneCourse, Value
 from scenicq.forest.scenario import Scenario
 from scenicq.geometry.driven_courses import CoursePlace
 from scenicq.store.labels import Label, LabelObject
@@ -16,7 +16,7 @@ __all__ = ["IN_COLUMNS", "course_rules", "observe", "observe_course", "observe_p
 
 IN_COLUMNS = frozenset({
     "position", "heading", "width", "length", "height", "velocity", "speed", "acceleration", "angularSpeed", COURSE,
-    GOING,
+    GOING, LAST_LANE,
 })  # fmt: skip
 """What a label says in columns alone: an attribute of such a name is none of these."""
 
@@ -26,6 +26,7 @@ def observe(label_object: LabelObject) -> Mapping[str, Value]:
     seen: dict[str, Value] = {"position": (float(label_object.x), float(label_object.y))}
     # one by one: all objects of all labels come here
     seen[GOING] = None
+    seen[LAST_LANE] = label_object.last_lane
     if label_object.heading is not None:
         seen["heading"] = seen[GOING] = float(label_object.heading)
     if label_object.width is not None:
@@ -87,7 +88,7 @@ def observed_names(label_object: LabelObject) -> frozenset[str]:
 def _names(present: tuple[bool, ...], attributes: tuple[str, ...]) -> frozenset[str]:
     parts = (("heading",), ("width",), ("length",), ("height",), ("velocity", "speed"), ("acceleration",))
     named = zip((*parts, ("angularSpeed",)), present, strict=False)
-    measured = ("position", GOING, *(name for names, there in named if there for name in names))
+    measured = ("position", GOING, LAST_LANE, *(name for names, there in named if there for name in names))
     return frozenset(measured).union(name for name in attributes if name not in IN_COLUMNS)
 
 

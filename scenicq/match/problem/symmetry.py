@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 from scenicq.forest.groups import PARAMS, Comparison, Group
 from scenicq.forest.nodes import (
+    AheadInLanes,
     Among,
     Arithmetic,
     Compare,
@@ -92,6 +93,8 @@ def shape_of(group: Group, ego: int, tolerance: Tolerance) -> GroupShape:
                 own = node.measure, node.seconds, node.end
             case LaneCourse():
                 own = id(node.network), node.gap_s
+            case AheadInLanes():
+                own = id(node.network)
             case _ if is_leaf(node):
                 number = leaves.setdefault(node.identity, len(leaves))  # type: ignore[union-attr]
                 own = (number, node.weights if isinstance(node, Index) else ())

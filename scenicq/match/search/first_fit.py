@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scenicq.budget import look
 from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.groups import Constraint
-from scenicq.forest.nodes import COURSE, GOING, Identity, LaneCourse, Leaf, Value
+from scenicq.forest.nodes import COURSE, GOING, LAST_LANE, Identity, LaneCourse, Leaf, Value
 from scenicq.forest.scenario import Scenario
 from scenicq.limits import LIMITS
 from scenicq.match.decide.closed_form import ClosedForm, Evaluated
@@ -34,6 +34,7 @@ from scenicq.match.problem.observation import observe, observe_course, observed_
 from scenicq.match.problem.outcome import Outcome
 from scenicq.match.search.group_plan import GroupPlan, MatchPlan
 from scenicq.store.labels import Label, LabelObject
+from scenicq.store.reader import LAST
 
 __all__ = ["FailedBatch", "FilledBatch", "FirstFit", "LabelRow", "first_fit_of", "signature_of"]
 
@@ -371,6 +372,8 @@ def _column(
     playing = [(row, mine[rank]) for row, mine in zip(rows, numbers, strict=True)]
     if name == GOING:
         name = "heading"  # nan where there is none
+    elif name == LAST_LANE:
+        name = LAST
     elif name not in _SCALARS and name != "position":
         return _numeric([row.observed(number)[name] for row, number in playing])
     objects = [_label_object(row.label, number) for row, number in playing]

@@ -34,6 +34,7 @@ if TYPE_CHECKING:  # they take long to load, and not every query needs the last 
 
     from scenicq.match.matcher import Matcher
     from scenicq.match.problem.candidates import Candidates
+    from scenicq.query.execution.own_lanes import OwnLanes
     from scenicq.query.execution.recorder import Recorder
     from scenicq.query.execution.recording_matcher import DecidedRecordings, RecordingMatcher
     from scenicq.query.execution.variant_matcher import VariantMatcher
@@ -130,6 +131,7 @@ class Decider:
     time: IntervalOptions = field(default_factory=IntervalOptions)
     until: float | None = None
     _recorders: dict[str, Recorder] = field(default_factory=dict["str", "Recorder"])
+    _own_lanes: dict[str, OwnLanes | None] = field(default_factory=dict["str", "OwnLanes | None"])
     _compiled: dict[str, CompiledMap] = field(default_factory=dict["str", CompiledMap])
     _matchers: dict[str, Matcher] = field(default_factory=dict["str", "Matcher"])
     _over_time: dict[str, RecordingMatcher | VariantMatcher] = field(
@@ -167,7 +169,11 @@ class Decider:
             decided = self._decide(block)
         if self.until is not None:
             decided = replace(decided, found=self._in_time(iter(decided.found)))
-        recorder = self._recorder(self._compiled[block.map])
+        compiled = self._compiled[block.map]
+        own_lanes = self._lanes_of(compiled)
+        if decided.recordings is not None and own_lanes is not None:
+            decided.recordings.results = [*own_lanes.at_the_start(self.dataset, decided.recordings.results)]
+        recorder = self._recorder(compiled)
         if recorder is None:
             return decided
         # what was found in time is recorded, however late it is then
@@ -278,6 +284,17 @@ class Decider:
             self._recorders[name] = Recorder(self.dataset, compiled.scenario, self.options)
         return self._recorders[name]
 
+    def _lanes_of(self, compiled: CompiledMap) -> OwnLanes | None:
+        """What names the lanes of roles; None where nobody reads them, or the program asks for none."""
+        name = compiled.network.name
+        if name not in self._own_lanes and self.proofs:
+            # takes long to load
+            from scenicq.query.execution.own_lanes import OwnLanes  # noqa: PLC0415
+
+            found = OwnLanes(compiled.scenario)
+            self._own_lanes[name] = found if found.asked else None
+        return self._own_lanes.get(name)
+
     def _players(
         self, plan: Plan, block: Block, frames: NDArray[np.int64]
     ) -> tuple[NDArray[np.int16], Mapping[str, NDArray[Any]]]:
@@ -326,15 +343,15 @@ class Decider:
 
     def _matched(self, compiled: CompiledMap, left: Iterator[Candidate]) -> Iterator[list[Result]]:
         """The results of labels, whose places are looked up so many at a time."""
-        matcher = self._matcher(compiled)
+        matcher, own_lanes = self._matcher(compiled), self._lanes_of(compiled)
         size = _FIRST_BATCH
         while batch := list(islice(left, size)):
             if self.all_matches:
                 for label, among in batch:
-                    yield [_result(label, verdict) for verdict in _every_match(matcher, label, among)]
+                    yield [_result(label, verdict, own_lanes) for verdict in _every_match(matcher, label, among)]
             else:
                 for (label, _), verdict in zip(batch, matcher.match_all(batch, details=self.every), strict=True):
-                    yield [_result(label, verdict)]
+                    yield [_result(label, verdict, own_lanes)]
             size = _BATCH
 
 
@@ -356,8 +373,11 @@ def _with_records(recorder: Recorder, found: Iterator[list[Result]]) -> Iterator
     raise DeadlineError
 
 
-def _result(label: Label, verdict: Verdict) -> Result:
-    return Result(label.frame, label.recording, label.timestamp_us, verdict, label.sensors)
+def _result(label: Label, verdict: Verdict, own_lanes: OwnLanes | None) -> Result:
+    lanes = None
+    if own_lanes is not None and isinstance(verdict, Match):
+        lanes = own_lanes.of_label(label, verdict.correspondence)
+    return Result(label.frame, label.recording, label.timestamp_us, verdict, label.sensors, lanes=lanes)
 
 
 def _every_match(matcher: Matcher, label: Label, among: Candidates | None) -> list[Verdict]:

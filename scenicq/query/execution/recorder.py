@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby, product
 from typing import cast
@@ -27,6 +27,7 @@ from scenicq.limits import LIMITS
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.conditioned import options_of
 from scenicq.match.verdict import Match, WitnessValue
+from scenicq.query.execution.members import Members
 from scenicq.query.execution.results import Recorded, RecordedCell, Result
 from scenicq.store.dataset import Dataset
 from scenicq.store.track_block import TrackBlock
@@ -99,7 +100,7 @@ class Recorder:
         part, first, end = self.dataset.recorded.rows(recording)
         with TrackBlock(self.dataset, part, [(first, end)]) as block:
             numbers = {name: number for number, name in enumerate(block.frames(np.arange(len(block))))}
-            members = _Members(block)
+            members = Members(block)
             matching = [each for each in results if isinstance(each.verdict, Match)]
             placed = [self._placed(members, numbers, each) for each in matching]
             recorded: list[Mapping[str, Recorded]] = []
@@ -109,7 +110,7 @@ class Recorder:
         for each in results:
             yield replace(each, recorded=next(told)) if isinstance(each.verdict, Match) else each
 
-    def _placed(self, members: _Members, numbers: Mapping[str, int], result: Result) -> _Placed:
+    def _placed(self, members: Members, numbers: Mapping[str, int], result: Result) -> _Placed:
         first = numbers[result.frame]
         end = first + (1 if result.interval is None else result.interval.count)
         roles = cast(Match, result.verdict).correspondence
@@ -157,45 +158,6 @@ class Recorder:
         for number in range(count):
             groups.setdefault(tuple(each[number] for each in seen), []).append(number)
         return list(groups.values())
-
-
-class _Members:
-    """Who is meant by the names in correspondences."""
-
-    def __init__(self, block: TrackBlock) -> None:
-        self._block = block
-        self._ids = block.ids()
-        self._tracks = block.tracks(np.arange(block.size))
-        self._named = block.track_names()
-        self._mates: dict[int, NDArray[np.int64]] = {}
-
-    def at(self, name: str, label: int, _end: int) -> NDArray[np.int64]:
-        """The label object of an id in a label, shape (1,)."""
-        if name == "ego":
-            return self._block.present_ego(np.array([label]))
-        return np.array([self._find(label, lambda member: self._ids[member] == name)])
-
-    def along(self, name: str, first: int, end: int) -> NDArray[np.int64]:
-        """The label objects of a track in labels; the end left out."""
-        if name == "ego":
-            return self._block.present_ego(np.arange(first, end))
-        named, ids = self._named, self._ids
-        at_first = self._find(first, lambda member: (ids[member] if named[member] is None else named[member]) == name)
-        found = np.full(end - first, -1)
-        if at_first < 0:
-            return found
-        track = int(self._tracks[at_first])
-        if track not in self._mates:
-            self._mates[track] = np.flatnonzero(self._tracks[: self._block.object_count] == track)
-        mates = self._mates[track]
-        labels = self._block.label_of[mates]
-        mine = (labels >= first) & (labels < end)
-        found[labels[mine] - first] = mates[mine]
-        return found
-
-    def _find(self, label: int, is_it: Callable[[int], bool]) -> int:
-        low, high = self._block.object_starts[label : label + 2].tolist()
-        return next((member for member in range(low, high) if is_it(member)), -1)
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from scenicq.forest.nodes import COURSE
+from scenicq.forest.nodes import COURSE, LAST_LANE
 from scenicq.forest.scenario import Scenario
 from scenicq.limits import LIMITS
 from scenicq.match.explanation import Finding
@@ -19,6 +19,7 @@ from scenicq.match.problem.candidates import Candidates
 from scenicq.match.problem.symmetry import classes_of_twins
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown
 from scenicq.store.labels import Label, LabelObject, Motion
+from scenicq.store.reader import LAST
 from scenicq.store.track_block import TrackBlock
 from scenicq.store.tracks import TrackKey
 from scenicq.temporal.stretches import StartTable
@@ -227,4 +228,5 @@ def _object(block: TrackBlock, member: int, id_: str, relevant: frozenset[str]) 
         id_, classes[int(codes[member])], "",
         float(block.numbers("x")[member]), float(block.numbers("y")[member]), number("heading"),
         number("width"), number("length"), number("height"), None, track, said[int(said_codes[member])], motion,
+        last_lane=number(LAST_LANE, LAST),
     )  # fmt: skip

@@ -15,7 +15,7 @@ from msgspec import UNSET, Struct, UnsetType
 from scenicq.errors import Source, Span
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown, Verdict, WitnessValue
 from scenicq.query.execution.result_summary import ResultSummary
-from scenicq.query.execution.results import IntervalSpan, LogDensity, Recorded, RecordedCell, Result
+from scenicq.query.execution.results import IntervalSpan, LogDensity, Recorded, RecordedCell, Result, Standing
 
 __all__ = [
     "DENSITY",
@@ -27,6 +27,7 @@ __all__ = [
     "IntervalRecord",
     "Record",
     "SeriesRecord",
+    "StandingRecord",
     "SummaryRecord",
     "decode_record",
     "json_text",
@@ -67,6 +68,18 @@ class FramesRecord(Struct, frozen=True):
     count: int
 
 
+class StandingRecord(Struct, frozen=True):
+    """In which lanes a role stands.
+
+    Attributes:
+        own: Those that are its own.
+        others: Those in which it lies, too.
+    """
+
+    own: list[str]
+    others: list[str]
+
+
 class SeriesRecord(Struct, frozen=True):
     """A recorded value over an interval.
 
@@ -92,6 +105,7 @@ class FrameRecord(Struct, frozen=True, kw_only=True):
         verdict: `match`, `unknown`, or `no_match`.
         correspondence: The label object of each role.
         witness: A value of each random variable that proves a match, a number or a point, by its place in the program.
+        lanes: In which lanes roles stand whose lanes the program asks for; absent where it asks for none.
         cause: What excludes a match, or leaves it open; absent in a match.
         sensors: The sensor file of each channel.
         recorded: What the program records of a match, by name; absent where it records nothing.
@@ -109,6 +123,7 @@ class FrameRecord(Struct, frozen=True, kw_only=True):
     verdict: VerdictName
     correspondence: dict[str, str] = {}
     witness: dict[str, Number | tuple[Number, Number]] = {}
+    lanes: dict[str, StandingRecord] | UnsetType = UNSET
     cause: CauseRecord | UnsetType = UNSET
     sensors: dict[str, str] = {}
     recorded: dict[str, CellRecord] | UnsetType = UNSET
@@ -136,6 +151,7 @@ class IntervalRecord(Struct, frozen=True, kw_only=True):
         frames: The first and the last frame, and how many there are.
         verdict: `match`, `unknown`, or `no_match`.
         correspondence: The track of each role.
+        lanes: As of a frame, at the first.
         witness, cause: As of a frame.
         open_ended: Whether the program does not say when the interval ends.
         recorded: As of a frame; over all samples of the interval, unless `initial` or `final` is recorded.
@@ -150,6 +166,7 @@ class IntervalRecord(Struct, frozen=True, kw_only=True):
     verdict: VerdictName
     correspondence: dict[str, str] = {}
     witness: dict[str, Number | tuple[Number, Number]] = {}
+    lanes: dict[str, StandingRecord] | UnsetType = UNSET
     cause: CauseRecord | UnsetType = UNSET
     open_ended: bool = False
     recorded: dict[str, CellRecord | SeriesRecord] | UnsetType = UNSET
@@ -235,6 +252,8 @@ def record(result: Result, dataset: str = "", *, every: bool = False) -> Record:
     more = {} if result.density is None else _density(result.density)
     if result.recorded is not None:
         more |= _recorded(result.recorded, series=span is not None)
+    if result.lanes is not None:
+        more["lanes"] = {role: StandingRecord(list(each.own), list(each.others)) for role, each in result.lanes.items()}
     if span is None:
         return FrameRecord(frame=result.frame, recording=result.recording, timestamp_us=result.timestamp_us,
                            verdict=name, correspondence=_dict(roles), witness=witness, cause=cause,
@@ -303,13 +322,18 @@ def read_record(record: Record, source: Source) -> Result:
         else Recorded((each,), series=False, lacking=lacking.get(name, {}))
         for name, each in told.items()
     }  # fmt: skip
+    standing = None
+    if record.lanes is not UNSET:
+        standing = {role: Standing(tuple(each.own), tuple(each.others)) for role, each in record.lanes.items()}
     if isinstance(record, FrameRecord):
         return Result(
-            record.frame, record.recording, record.timestamp_us, verdict, record.sensors, recorded=recorded
+            record.frame, record.recording, record.timestamp_us, verdict, record.sensors, recorded=recorded,
+            lanes=standing,
         )  # fmt: skip
     frames = record.frames
     span = IntervalSpan(frames.last, record.end_us, frames.count, record.open_ended)
-    return Result(frames.first, record.recording, record.start_us, verdict, interval=span, recorded=recorded)
+    return Result(frames.first, record.recording, record.start_us, verdict, interval=span, recorded=recorded,
+                  lanes=standing)  # fmt: skip
 
 
 def _verdict(record: Record, source: Source) -> Verdict:

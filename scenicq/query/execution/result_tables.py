@@ -90,6 +90,8 @@ def _column(kind: inspect.Type) -> pa.DataType:
     match kind:
         case inspect.StructType():
             return pa.struct([(each.name, _column(each.type)) for each in kind.fields])
+        case inspect.ListType():
+            return pa.list_(_column(kind.item_type))
         case inspect.DictType():
             return pa.map_(pa.string(), _column(kind.value_type))
         case inspect.UnionType():
@@ -133,6 +135,8 @@ def _row(record: Record, recorded: pa.DataType | None) -> dict[str, Any]:
         cells["recorded"] = struct_of_row(cells["recorded"], recorded)
     if "unrecorded" in cells:
         cells["unrecorded"] = [(name, [*reasons.items()]) for name, reasons in cells["unrecorded"].items()]
+    if "lanes" in cells:
+        cells["lanes"] = [*cells["lanes"].items()]
     listed = ((place, [value] if isinstance(value, int | float) else value) for place, value in record.witness.items())
     return cells | {"witness": [*listed], "sensors": [*cells.get("sensors", {}).items()]}
 
@@ -151,7 +155,7 @@ def read_row(row: Mapping[str, Any], origin: str = "") -> Record:
     for name in ("correspondence", "cause"):
         if isinstance(cells := found.get(name), dict):
             found[name] = {key: value for key, value in cast("dict[str, Any]", cells).items() if value is not None}
-    for name in ("witness", "sensors", "unrecorded"):
+    for name in ("witness", "lanes", "sensors", "unrecorded"):
         if isinstance(pairs := found.get(name), list):
             found[name] = dict(cast("list[tuple[str, Any]]", pairs))
     if isinstance(reasons := found.get("unrecorded"), dict):

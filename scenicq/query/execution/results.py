@@ -11,7 +11,18 @@ from typing import Any
 from scenicq.errors import Diagnostic
 from scenicq.match.verdict import Match, NoMatch, Unknown, Verdict
 
-__all__ = ["Chosen", "Funnel", "IntervalSpan", "LogDensity", "Recorded", "RecordedCell", "Result", "Sample", "up_to"]
+__all__ = [
+    "Chosen",
+    "Funnel",
+    "IntervalSpan",
+    "LogDensity",
+    "Recorded",
+    "RecordedCell",
+    "Result",
+    "Sample",
+    "Standing",
+    "up_to",
+]
 
 RecordedCell = float | bool | str | tuple[float, float] | None
 """A recorded value: a number, a truth value, a text, a vector; None where there is none."""
@@ -71,6 +82,19 @@ class Recorded:
 
 
 @dataclass(frozen=True, slots=True)
+class Standing:
+    """In which lanes a label object stands.
+
+    Attributes:
+        own: The lanes that are its own.
+        others: Those in which it lies, too.
+    """
+
+    own: tuple[str, ...] = ()
+    others: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class Result:
     """The verdict on one frame, or on an interval of a recording.
 
@@ -81,6 +105,8 @@ class Result:
         interval: How far the interval goes on; None for a frame.
         density: How typical it is, where that was asked for.
         recorded: What the program records of a match, by name; None where nobody asks for it.
+        lanes: In which lanes the roles of a match stand whose lanes the program asks for, by name; of an interval at
+            its first frame. None where it asks for none.
     """
 
     frame: str
@@ -91,11 +117,12 @@ class Result:
     interval: IntervalSpan | None = None
     density: LogDensity | None = None
     recorded: Mapping[str, Recorded] | None = None
+    lanes: Mapping[str, Standing] | None = None
 
     def __reduce__(self) -> tuple[type[Result], tuple[Any, ...]]:
         """Pickled as a call, which takes half the time; densities are computed where results arrive."""
         told = (self.frame, self.recording, self.timestamp_us, self.verdict, self.sensors, self.interval)
-        return Result, told if self.recorded is None else (*told, None, self.recorded)
+        return Result, told if self.recorded is self.lanes is None else (*told, None, self.recorded, self.lanes)
 
 
 @dataclass(frozen=True, slots=True)

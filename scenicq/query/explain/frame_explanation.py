@@ -8,7 +8,7 @@ smallest tolerance under which the frame would match.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from scenicq.errors import Diagnostic, Span, render
 from scenicq.forest.compute import CannotEvaluate
@@ -25,6 +25,8 @@ from scenicq.match.explanation import (
 )
 from scenicq.match.matcher import Matcher
 from scenicq.match.verdict import Match, NoMatch, Unknown, Verdict, WitnessValue
+from scenicq.query.execution.own_lanes import OwnLanes, show_standing
+from scenicq.query.execution.results import Standing
 from scenicq.query.explain.changes import show_tolerance
 from scenicq.query.explain.margins import SatisfiedConstraint, margins
 from scenicq.query.explain.nearest_miss import Closest, closest, separated
@@ -72,6 +74,7 @@ class Explanation:
         violations: What the closest correspondence breaks, the first to be blamed first.
         closest: The smallest tolerance under which the frame would match; None if it matches, or if none would do.
         formulas: The groups under that correspondence.
+        lanes: In which lanes its roles stand whose lanes the program asks for, by name.
     """
 
     frame: str
@@ -82,6 +85,7 @@ class Explanation:
     violations: tuple[Violation, ...] = ()
     closest: Closest | None = None
     formulas: tuple[GroupScript, ...] = ()
+    lanes: Mapping[str, Standing] = field(default_factory=dict[str, Standing])
 
 
 def explain(matcher: Matcher, label: Label, *, formulas: bool = False) -> Explanation:
@@ -108,6 +112,7 @@ def explain(matcher: Matcher, label: Label, *, formulas: bool = False) -> Explan
         violations=_violations(matcher, found),
         closest=nearest,
         formulas=_formulas(matcher, found) if formulas else (),
+        lanes=OwnLanes(matcher.scenario).of_label(label, nearest.finding.verdict.correspondence),
     )
 
 
@@ -135,6 +140,7 @@ def _of_match(matcher: Matcher, label: Label, finding: Finding, verdict: Match, 
         _proofs(finding),
         margins(matcher, finding.search, finding.plan, finding.assignment),
         formulas=_formulas(matcher, finding) if formulas else (),
+        lanes=OwnLanes(matcher.scenario).of_label(label, verdict.correspondence),
     )
 
 
@@ -160,7 +166,8 @@ def _without_match(matcher: Matcher, label: Label, finding: Finding, *, formulas
     if not found:
         told = "is not met" if isinstance(finding.verdict, NoMatch) else "is not decided"
         found = (Violation(cause.what, told, cause.detail, cause.span),)
-    return Explanation(label.frame, finding.verdict, shown, violations=found)
+    lanes = OwnLanes(matcher.scenario).of_label(label, shown)
+    return Explanation(label.frame, finding.verdict, shown, violations=found, lanes=lanes)
 
 
 def _proofs(finding: Finding) -> tuple[Proof, ...]:
@@ -233,6 +240,7 @@ def show_explanation(explanation: Explanation) -> str:
     if explanation.correspondence or isinstance(verdict, NoMatch):
         roles = ", ".join(f"{name} = {played}" for name, played in explanation.correspondence.items())
         lines.append(f"{kind}: {roles}")
+    lines += [f"{name} is {show_standing(each)}" for name, each in explanation.lanes.items()]
     if explanation.proofs:
         lines += ["", "it matches with these values:", *_show_proofs(explanation.proofs)]
     if explanation.margins:

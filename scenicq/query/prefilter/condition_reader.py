@@ -19,6 +19,7 @@ from scenicq.forest.groups import Comparison
 from scenicq.forest.interval_values import Interval, IntervalVector
 from scenicq.forest.nodes import (
     GOING,
+    LAST_LANE,
     Arithmetic,
     ArithmeticOp,
     Constant,
@@ -57,6 +58,7 @@ from scenicq.query.prefilter.sql_ends import (
     number,
     within_turn,
 )
+from scenicq.store.reader import LAST
 from scenicq.store.schema import MEMBERSHIP_RADIUS_M
 
 __all__ = ["EGO", "ColumnCondition", "ConditionReader", "object_columns"]
@@ -102,7 +104,7 @@ def object_columns(alias: str, prefix: str = "") -> dict[str, str | tuple[str, s
     found["velocity"] = (vx, vy)
     found["speed"] = f"sqrt({vx} * {vx} + {vy} * {vy})"
     found["acceleration"], found["angularSpeed"] = f"{start}acceleration", f"{start}yaw_rate"
-    found[GOING] = f"{start}heading"
+    found[GOING], found[LAST_LANE] = f"{start}heading", f"{start}{LAST}"
     if not prefix:
         found[PLACE], found[DISTANCE] = (f"{start}ego_right", f"{start}ego_ahead"), f"{start}ego_distance"
     return found

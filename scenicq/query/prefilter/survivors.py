@@ -14,11 +14,11 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from scenicq.forest.nodes import COURSE
+from scenicq.forest.nodes import COURSE, LAST_LANE
 from scenicq.match.problem.observation import IN_COLUMNS
 from scenicq.query.prefilter.plan import LABELS, OBJECTS, SENSORS, Plan
 from scenicq.store.labels import Label
-from scenicq.store.reader import LABEL_COLUMNS, MOTION_COLUMNS, OBJECT_COLUMNS, assemble
+from scenicq.store.reader import LABEL_COLUMNS, LAST, MOTION_COLUMNS, OBJECT_COLUMNS, assemble
 from scenicq.store.recorded_tracks import RecordedTracks
 from scenicq.store.schema import ArrowTable
 
@@ -147,6 +147,8 @@ def _columns(observed: Collection[str] | None) -> list[str]:
         wanted.update(("vx", "vy"))
     if COURSE in observed:
         wanted.update(("track", "heading"))
+    if LAST_LANE in observed:
+        wanted.add(LAST)
     if not IN_COLUMNS.issuperset(observed):
         wanted.add("attributes")
     return [name for name in OBJECT_COLUMNS if name in wanted]

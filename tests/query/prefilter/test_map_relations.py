@@ -15,7 +15,7 @@ from shapely import Point, union_all
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import ScenarioError, Source
 from scenicq.forest.evaluate import evaluate
-from scenicq.forest.nodes import GOING, Constant, Index, Node, PointIn, Select
+from scenicq.forest.nodes import GOING, LAST_LANE, Constant, Index, Node, PointIn, Select
 from scenicq.forest.walk import leaves
 from scenicq.geometry.regions import PolygonSet
 from scenicq.match.matcher import Matcher
@@ -209,6 +209,7 @@ def test_one_of_the_elements_at_a_place_is_meant_throughout(dataset: Dataset, sa
     for label in dataset.labels():
         heading = label.ego.heading
         ego = {(0, "position"): (label.ego.x, label.ego.y), (0, "heading"): heading, (0, GOING): heading}
+        ego[0, LAST_LANE] = label.ego.last_lane
         right = any(
             all(evaluate(each, dict(zip(chosen, map(float, ranks), strict=True)), ego) is True for each in conditions)
             for ranks in itertools.product(*map(range, chosen.values()))
