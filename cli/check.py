@@ -83,6 +83,10 @@ def networks_of(
 
 def _told(scenario: Scenario) -> str:
     roles = ", ".join(f"{owner.name}: {owner.category}" for owner in scenario.objects)
+    mine = {owner.name for owner in scenario.objects}
+    others = {owner.name: owner.category for each in scenario.variants for owner in each.every_object}
+    more = ", ".join(f"{name}: {category}" for name, category in others.items() if name not in mine)
+    roles += f"; in some runs also {more}" if more else ""
     written = sum(requirement.built_in is None for requirement in scenario.requirements)
     over_time = len(scenario.dynamics.requirements) if scenario.dynamics is not None else 0
     timed = f" and {over_time} over time" if over_time else ""

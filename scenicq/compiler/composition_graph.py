@@ -146,7 +146,7 @@ class ComposedScenario:
     def arrives(self) -> Node:
         """That a sample shows what it makes, as a condition that no label says."""
         index = cast(int, self.objects[0].index)
-        return Feature(index, f"{ARRIVES}{self.number}", "boolean", current=True)
+        return Feature(index, f"{ARRIVES}{self.number}", "boolean", current=True, span=self.span)
 
 
 @dataclass(frozen=True, eq=False)

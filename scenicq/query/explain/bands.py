@@ -83,9 +83,12 @@ def bands_of(scenario: Scenario, over: KnownConditions) -> tuple[Band, ...]:
     columns, known = over.columns, over.truths
     found: list[Band] = []
 
+    arrivals = {number for each in scenario.arrivals for number in each.conditions}
+
     def add(number: int, what: str = "") -> None:
         condition = dynamics.conditions[number]
-        if number in known:
+        # no label says where objects come
+        if number in known and number not in arrivals:
             values = tuple(known[number].tolist())
             told = what or _named(condition, number)
             found.append(Band(told, condition.span, values, sides=_sides(columns, condition)))
