@@ -14,6 +14,7 @@ from scenicq.compiler.program import compile_scenario
 from scenicq.errors import DataError, Diagnostic, ScenarioError, ScenicqError, Source
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.show import show_forest
+from scenicq.forest.show_modes import show_modes
 from scenicq.geometry.default_street import street
 from scenicq.geometry.network import Network
 from scenicq.lint.impossible import impossible_requirements
@@ -82,6 +83,10 @@ def networks_of(
 
 def _told(scenario: Scenario) -> str:
     roles = ", ".join(f"{owner.name}: {owner.category}" for owner in scenario.objects)
+    mine = {owner.name for owner in scenario.objects}
+    others = {owner.name: owner.category for each in scenario.variants for owner in each.every_object}
+    more = ", ".join(f"{name}: {category}" for name, category in others.items() if name not in mine)
+    roles += f"; in some runs also {more}" if more else ""
     written = sum(requirement.built_in is None for requirement in scenario.requirements)
     over_time = len(scenario.dynamics.requirements) if scenario.dynamics is not None else 0
     timed = f" and {over_time} over time" if over_time else ""
@@ -208,6 +213,11 @@ def _found(
 @MAP_DEFAULTS
 @click.option("--initial", is_flag=True, help="Ignore behaviors and other dynamic parts.")
 @click.option("--forest", is_flag=True, help="Print the expression forest.")
+@click.option(
+    "--modes",
+    is_flag=True,
+    help="Print the modes that monitors, behaviors and scenarios may be in, and where each leads.",
+)
 @click.option("--groups", is_flag=True, help="Print the groups of jointly dependent constraints, in order.")
 @click.option("--classes", type=click.Choice(["fine", "coarse"]), default="fine",
               help="Look at the program as `match` does with these classes.")  # fmt: skip
@@ -222,7 +232,7 @@ def _found(
 @click.pass_context
 def check(ctx: click.Context, scenario: str | None, dataset: str | None, *, program: str | None,
           run_scenario: str | None, params: tuple[tuple[str, str], ...], map_file: Path | None, scenic: str | None,
-          map_defaults: bool, initial: bool, forest: bool, groups: bool,
+          map_defaults: bool, initial: bool, forest: bool, modes: bool, groups: bool,
           classes: Literal["fine", "coarse"], strict: bool, format_: str) -> None:  # fmt: skip
     """Say whether a scenario is sound, and how it is read.
 
@@ -233,7 +243,7 @@ def check(ctx: click.Context, scenario: str | None, dataset: str | None, *, prog
     map = localPath('FILE')`, or else a small built-in street.
     """
     lines: list[str] = []
-    details: Details = [show_forest] * forest + [_groups] * groups
+    details: Details = [show_forest] * forest + [show_modes] * modes + [_groups] * groups
     try:
         version, warnings = read_version(scenic), list[Diagnostic]()
         source, (target,), model = given_program(ctx, program, (scenario, dataset))

@@ -24,7 +24,7 @@ from .manual import Manual
 from .match import match
 from .options import ONE_FRAME, OVER_TIME, SHARED, query_options
 from .path_type import ANY_PATH
-from .programs import PARAMS, PROGRAM_TEXT, RUN_SCENARIO, SCENARIO, given_program
+from .programs import PROGRAM_TEXT, SCENARIO, given_program
 from .remarks import remarks, show_remarks
 from .report import plain
 from .streams import say
@@ -59,8 +59,6 @@ __all__ = ["explain"]
 @click.argument("dataset", metavar="DATASET", type=click.Path(), required=False)
 @click.argument("frame", metavar="FRAME", required=False)
 @PROGRAM_TEXT
-@RUN_SCENARIO
-@PARAMS
 @click.option("--smt2", metavar="DIR", type=ANY_PATH,
               help="Write the formula of each group as SMT-LIB 2 into a folder, here or elsewhere.")  # fmt: skip
 @click.option("--exit-zero", is_flag=True, help="Exit with 0 also where the frame does not match.")

@@ -135,4 +135,5 @@ def show(dataset: str, frame: str, *, scenario: Path | None, output: AnyPath | N
         say()
 
 
-show.params += [option for option in match.params if option.name in SHARED | OVER_TIME]
+# --scenario names the program here
+show.params += [option for option in match.params if option.name in (SHARED | OVER_TIME) - {"run_scenario"}]

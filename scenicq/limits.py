@@ -103,7 +103,6 @@ class Limits:
     random_way_steps: int = _refused(100, "steps", "along a field over a random distance")
     known_way_steps: int = _refused(2_000, "steps", "along a field over a known distance")
     projection_segments: int = _refused(200, "segments", "of a line onto which a point is projected that is not known")
-    scenario_starts: int = _refused(8, "times", "that one call of a scenario that makes objects begins in a run")
     scenario_variants: int = _refused(
         16, "combinations", "of scenarios that make objects and begin in some runs of a program alone"
     )
@@ -298,6 +297,16 @@ class Limits:
     )
     observation_ways: int = _undecided(
         1024, "ways", "in which what is not observed at one sample may come out", "budget"
+    )
+    scenario_starts: int = _undecided(
+        8, "times", "that one call of a scenario that makes objects begins in a run", "budget"
+    )
+    arrival_combinations: int = _undecided(
+        200_000, "combinations", "of starts with tracks for objects that come later, in one block", "budget"
+    )
+    mode_ways: int = _shorter(2_000, "steps", "of the ways from one mode to others that are shown")
+    arrival_questions: int = _undecided(
+        2_000, "labels", "at which objects may come, in one process, that arrays do not decide", "budget"
     )
     run_modes: int = _undecided(256, "modes", "in which one run may be at once", "budget")
     run_situations: int = _undecided(20_000, "situations", "of one program", "budget")

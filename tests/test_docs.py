@@ -47,6 +47,12 @@ def test_every_option_has_help_and_is_in_the_reference(name):
 
 
 @pytest.mark.parametrize("name", COMMANDS)
+def test_no_option_is_there_twice(name):
+    words = [option for each in _command(name).params for option in (*each.opts, *each.secondary_opts)]
+    assert sorted(words) == sorted(set(words))
+
+
+@pytest.mark.parametrize("name", COMMANDS)
 def test_examples_use_only_options_that_there_are(name):
     known = {option for parameter in _command(name).params for option in (*parameter.opts, *parameter.secondary_opts)}
     assert set(re.findall(r"(?<!\S)--?[a-z][a-z0-9-]*", _command(name).epilog)) <= known | {"--help"}

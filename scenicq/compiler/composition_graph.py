@@ -48,7 +48,7 @@ from scenicq.compiler.process_states import (
 )  # fmt: skip
 from scenicq.compiler.values import Choice, Instance, ModelValue, describe, fail
 from scenicq.errors import Span
-from scenicq.forest.nodes import Identity, Node
+from scenicq.forest.nodes import PAST, Feature, Identity, Index, Node
 from scenicq.forest.temporal import (
     Always,
     And,
@@ -58,6 +58,7 @@ from scenicq.forest.temporal import (
     End,
     Eventually,
     Formula,
+    GiveUp,
     Leave,
     Next,
     Not,
@@ -77,8 +78,10 @@ from scenicq.syntax import ast
 if TYPE_CHECKING:
     pass
 
-__all__ = ["ComposedScenario", "Composition", "CompositionGraph"]
+__all__ = ["ARRIVES", "ComposedScenario", "Composition", "CompositionGraph"]
 
+ARRIVES = f"{PAST}arrives "
+"""How what stands for the beginning of a scenario that makes objects is called, before its number."""
 MakesProcess = Callable[
     [ModelValue, "Instance | None", Span, int, bool], "tuple[int, Sequence[tuple[GraphGuards, Node, Span]]]"
 ]
@@ -133,6 +136,17 @@ class ComposedScenario:
     def objects(self) -> list[Instance]:
         """The objects that it makes."""
         return self.made.objects
+
+    @property
+    def is_late(self) -> bool:
+        """Whether it makes objects after the first sample."""
+        return bool(self.objects) and not self.is_early
+
+    @property
+    def arrives(self) -> Node:
+        """That a sample shows what it makes, as a condition that no label says."""
+        index = cast(int, self.objects[0].index)
+        return Feature(index, f"{ARRIVES}{self.number}", "boolean", current=True, span=self.span)
 
 
 @dataclass(frozen=True, eq=False)
@@ -363,6 +377,8 @@ class CompositionGraph(ProcessGraph):
     ) -> Following:
         """What follows where a scenario begins."""
         scenario = self._scenario(state, value, after.span)
+        if scenario is None:
+            return GiveUp(after.span)
         timer = -1
         timed = rest
         if is_named or scenario.objects or (not self.has_setup and not rest.begun):
@@ -374,7 +390,8 @@ class CompositionGraph(ProcessGraph):
         definition = cast(ScenarioDefinition, value.of)
         frames: tuple[ProcessFrame, ...] | None = None
         if definition.compose is not None or definition.guards("invariant"):
-            call = CallFrame(value, self.held(scenario.made.scope.names))
+            names = {name: scenario.names[name] for name in scenario.made.scope.names}
+            call = CallFrame(value, self.held(names))
             frames = call, self._body(definition)
         running = RunningScenario(scenario.number, timer, frames)
         found: Following = self.pushed(timed, BlockFrame((replace(after, begun=(*after.begun, running)),)))
@@ -386,6 +403,8 @@ class CompositionGraph(ProcessGraph):
             found = Directs(Begin(scenario.number, 0), found)
         for guards, node, span in reversed(scenario.asked):
             found = self.test(state, node, guards, found, Reject(span), span)
+        if scenario.is_late:
+            found = self.test(state, scenario.arrives, (), found, Reject(after.span), after.span)
         return found
 
     def _override(self, state: ProcessState, node: ast.Override, rest: ProcessState) -> Following:
@@ -422,8 +441,8 @@ class CompositionGraph(ProcessGraph):
 
     # --- scenarios
 
-    def _scenario(self, state: ProcessState, call: ScenarioCall, span: Span) -> ComposedScenario:
-        """The scenario that a call begins in a state; one that makes objects begins once."""
+    def _scenario(self, state: ProcessState, call: ScenarioCall, span: Span) -> ComposedScenario | None:
+        """The scenario that a call begins in a state: each that makes objects once; None where these are too many."""
         parent, key = self.within(state), self.values.hold(call).key
         used = {number for _, number in state.begun}
         initial = not self.has_setup and not state.begun
@@ -434,8 +453,7 @@ class CompositionGraph(ProcessGraph):
                 self._known[key, parent, state.first, initial, count] = known
             if not known.objects or known.number not in used:
                 return known
-        raise fail("budget-exceeded", f"a scenario that makes objects begins more than {LIMITS.scenario_starts} times",
-                   span, "begins again here", ("make its objects before, and give them to it",))  # fmt: skip
+        return None
 
     def _set_up(
         self, state: ProcessState, call: ScenarioCall, parent: int, span: Span, *, initial: bool
@@ -448,9 +466,8 @@ class CompositionGraph(ProcessGraph):
         number = len(self.scenarios)
         found = ComposedScenario(number, parent, call, made, state.first, span)
         self.scenarios.append(found)
-        if found.objects and not state.first:
-            raise fail("unsupported-construct", "a scenario that makes objects begins after the first sample", span,
-                       "begins here", ("make its objects in the `setup` of the scenario that runs it",))  # fmt: skip
+        if found.is_late:
+            found.names = {name: self._forgotten(value, found, name) for name, value in found.names.items()}
         with self._drawn_by_scene(state):
             self._read(state, found)
         return found
@@ -470,6 +487,11 @@ class CompositionGraph(ProcessGraph):
                 conditions = [self.excluding(each) for each in timed.conditions]
         finally:
             run.current_ego, run.course = before, course
+        if found.is_late:
+            conditions = [
+                (self._unknown_now(state, node, found, f"condition {number}"), guards)
+                for number, (node, guards) in enumerate(conditions)
+            ]
         if not found.objects:
             found.asked += [((), node, span) for node, span in found.made.excluded]
         for requirement in timed.requirements:
@@ -488,6 +510,8 @@ class CompositionGraph(ProcessGraph):
             found.processes.append(number)
             found.asked += asked
         for instance, behavior, span in timed.agents:
+            if found.is_late:
+                behavior = self._forgotten(behavior, found, f"behavior {instance.index}")  # noqa: PLW2901
             number, asked = self.adds(behavior, instance, span, found.number, False)
             found.processes.append(number)
             found.asked += asked
@@ -495,6 +519,21 @@ class CompositionGraph(ProcessGraph):
             number, asked = self._overriding(behavior, instance, span)
             found.asked += asked
             found.overrides.append((cast(int, instance.index), number))
+
+    def _forgotten(self, value: ModelValue, scenario: ComposedScenario, name: str) -> ModelValue:
+        """What is known of a value after the sample at which its scenario has begun."""
+        return self.values.forgotten(value, f"{name} of scenario {scenario.number}")
+
+    def _unknown_now(self, state: ProcessState, node: Node, scenario: ComposedScenario, name: str) -> Node:
+        """A condition of which nothing is known that was read, or drawn, where its scenario has begun."""
+        found = cast(Node, self._forgotten(node, scenario, name))
+        for leaf in self.values.drawn(found):
+            if isinstance(leaf, Index):
+                raise fail("unsupported-construct", "a choice of a scenario that begins within a run is not supported",
+                           leaf.span or scenario.span, "drawn when it begins",
+                           ("draw it in the `setup` of the scenario that runs it",))  # fmt: skip
+            found = cast(Node, self.values.without(found, leaf, self.unknown(leaf, state, scenario.span, ())))
+        return found
 
     def _formula(
         self, formula: Formula, conditions: Sequence[tuple[Node, GraphGuards]], guards: list[tuple[Node, Span]]
@@ -548,11 +587,14 @@ class CompositionGraph(ProcessGraph):
                 following = on(at=frame.at + 1)
                 return following if scenario.is_silent else OnRunning(running.number, following, without)
             case "begins":
-                inside = on(stage="ends" if running.frames is None else "inside")
+                known = (*frame.scenarios[: frame.at], replace(running, is_new=False), *frame.scenarios[frame.at + 1 :])
+                inside = on(stage="ends" if running.frames is None else "inside", scenarios=known)
                 if running.frames is not None:
                     inside = replace(inside, frames=(*inside.frames, *running.frames),
                                      resumed=len(inside.frames) if running.resumes else -1, asked=-1)  # fmt: skip
-                found: Following = inside if running.timer < 0 else OnTimer(running.timer, over, inside)
+                found: Following = (
+                    inside if running.timer < 0 or running.is_new else OnTimer(running.timer, over, inside)
+                )
                 if scenario.after_s == 0:
                     found = over
                 return Directs(CheckSample(running.number, 0), found) if scenario.requirements else found

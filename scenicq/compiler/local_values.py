@@ -154,6 +154,24 @@ class LocalValues:
             return value
         return self._mapped(value, step)
 
+    def forgotten(self, value: ModelValue, place: str) -> ModelValue:
+        """A value of which nothing is known any more that was read at a sample, or drawn.
+
+        Args:
+            value: The value.
+            place: Where it is, in words that are no other variable's.
+        """
+
+        def step(node: Node) -> Node:
+            if isinstance(node, Feature) and not node.property.startswith(PAST) and not node.current:
+                name = f"{PAST}{place} in {self.process}: {node.object} {node.property}"
+                return replace(node, property=name, current=True)
+            return node
+
+        if isinstance(value, Instance) and value.index is not None:
+            return value
+        return self._mapped(value, step)
+
     def reads_samples(self, value: ModelValue) -> bool:
         """Whether something of a value is read at each sample."""
         return any(map(_is_current, postorder(self.nodes(value))))

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from scenicq.compiler.interpreter import Interpreter
 
 __all__ = [
+    "between_boxes",
     "box_distance",
     "course_change",
     "deceleration_to_avoid",
@@ -85,7 +86,12 @@ def deceleration_to_avoid(run: Interpreter, span: Span, one: ModelValue, other: 
 
 def box_distance(_run: Interpreter, span: Span, one: ModelValue, other: ModelValue) -> Node:
     """Metres between the boxes of two objects; 0 where they touch."""
-    boxes = [_Seen(each, "box_distance", span) for each in (one, other)]
+    return between_boxes(one, other, span, "box_distance")
+
+
+def between_boxes(one: ModelValue, other: ModelValue, span: Span, name: str) -> Node:
+    """As `box_distance`, by the name by which it is asked for."""
+    boxes = [_Seen(each, name, span) for each in (one, other)]
     areas = [object_box(each.instance, span) for each in boxes]
     ways = [
         Distance(area, corner, span=span)

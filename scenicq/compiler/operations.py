@@ -13,6 +13,7 @@ from scenicq.compiler import operators
 from scenicq.compiler.attributes import PARTS, part_of
 from scenicq.compiler.coerce import to_vector
 from scenicq.compiler.following import follow
+from scenicq.compiler.measures import between_boxes
 from scenicq.compiler.random_values import holds_instances, lift
 from scenicq.compiler.values import Builtin, ModelValue, fail
 from scenicq.errors import Span
@@ -65,6 +66,10 @@ def _by_ego(sight: Callable[..., ModelValue], run: Interpreter, region: ModelVal
     return sight(region, run.ego(span), span)
 
 
+def _box_distance(one: ModelValue, other: ModelValue, span: Span) -> ModelValue:
+    return between_boxes(one, other, span, "minimum distance")
+
+
 def _initial(run: Interpreter, span: Span) -> ModelValue:
     # but for scenarios that others run, the scene that is matched is the initial one
     run.dynamic("initial scenario", span)
@@ -97,6 +102,8 @@ _OPERATIONS: dict[PhraseRow, _Operation | _Refusal] = each_meaning(OPERATORS, {
     "apparent heading of {target} [from {origin}]": _Operation(operators.apparent_heading),
     "distance to {target} [from {origin}]": _DISTANCE,
     "distance from {origin} [to {target}]": _FROM,
+    "minimum distance to {target} [from {origin}]": _Operation(_box_distance),
+    "minimum distance from {origin} [to {target}]": _Operation(_box_distance),
     "distance past {target} [of {origin}]": _Operation(operators.distance_past),
     "angle to {target} [from {origin}]": _ANGLE,
     "angle from {origin} [to {target}]": _ANGLE_FROM,

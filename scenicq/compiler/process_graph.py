@@ -765,7 +765,8 @@ class ProcessGraph:
             return checked
         timer = free_timer(timers_of(checked))
         frame = TryFrame((None,), ((),), body, timer, ends=True)
-        found = replace(self.pushed(checked, frame), resumed=len(checked.frames), asked=0)
+        # no time is over at the sample at which it starts
+        found = self.switched(self.pushed(checked, frame), len(checked.frames), len(frame.handlers))
         return TimerStarts(timer, after_s, found)
 
     def begin(self, state: ProcessState, value: ModelValue, rest: ProcessState, span: Span) -> Following:

@@ -11,7 +11,7 @@ from scenicq.compiler.local_values import Held
 from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.forest.nodes import Node
-from scenicq.forest.temporal import Begin, CheckSample, End, Leave, PutBehavior, Reject, Stop, Terminate
+from scenicq.forest.temporal import Begin, CheckSample, End, GiveUp, Leave, PutBehavior, Reject, Stop, Terminate
 from scenicq.limits import LIMITS
 from scenicq.syntax import ast
 
@@ -194,12 +194,14 @@ class RunningScenario:
         timer: The number of the timer that ends it; -1 for none.
         frames: Those of what it composes, the outermost first; None where it composes nothing.
         resumes: Whether they go on after a sample.
+        is_new: Whether it has begun with this sample: then its time is not over.
     """
 
     number: int
     timer: int
     frames: tuple[ProcessFrame, ...] | None
     resumes: bool = False
+    is_new: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -271,7 +273,8 @@ class Asked:
 GraphGuards: TypeAlias = tuple[tuple[Node, Span], ...]
 ScenarioStep: TypeAlias = Begin | CheckSample | Stop | Leave | PutBehavior
 Following: TypeAlias = (
-    "ProcessState | Asked | Ways | OnTimer | TimerStarts | Waits | Terminate | Reject | End | Directs | OnRunning"
+    "ProcessState | Asked | Ways | OnTimer | TimerStarts | Waits | Terminate | Reject | End | GiveUp | Directs"
+    " | OnRunning"
 )
 
 

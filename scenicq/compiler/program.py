@@ -255,7 +255,13 @@ def _scenario(
     )  # fmt: skip
     if composition is None:
         return found
-    return with_variants(found, composition, owners, lambda index: _built_in(run, run.objects[index]))
+    return with_variants(
+        found,
+        composition,
+        owners,
+        [each.label for each in run.objects],
+        lambda index: _built_in(run, run.objects[index]),
+    )
 
 
 def _begun_with(scenario: ComposedScenario) -> list[Requirement]:

@@ -6,13 +6,15 @@ is none. What begins with the first sample belongs to the initial scene of the v
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from typing import cast
 
-from scenicq.compiler.composition_graph import ComposedScenario, Composition
+from scenicq.compiler.composition_graph import ARRIVES, ComposedScenario, Composition
 from scenicq.compiler.values import fail
-from scenicq.forest.nodes import CLOCK, Constant, Feature, Node
-from scenicq.forest.scenario import Requirement, Scenario, ScenarioObject
+from scenicq.forest.nodes import CLOCK, PAST, Constant, Feature, Node
+from scenicq.forest.scenario import Arrival, Requirement, Scenario, ScenarioObject
 from scenicq.forest.simplify import rebuilt
 from scenicq.forest.temporal import (
     Begin,
@@ -39,7 +41,7 @@ _Begun = frozenset[int]
 
 
 def with_variants(
-    scenario: Scenario, composition: Composition, owners: Mapping[int, int],
+    scenario: Scenario, composition: Composition, owners: Mapping[int, int], labels: Sequence[str],
     built_in: Callable[[int], Sequence[Requirement]],
 ) -> Scenario:  # fmt: skip
     """A scenario with its variants; with the objects that are there in all of them.
@@ -48,6 +50,7 @@ def with_variants(
         scenario: The scenario with all objects that there may be, without the built-in requirements.
         composition: What composes scenarios.
         owners: The number of the scenario that each requirement is of, by its id; not those of the program.
+        labels: The variable that each object was given to first.
         built_in: The built-in requirements, for an ego by its index.
 
     Raises:
@@ -57,7 +60,7 @@ def with_variants(
     cases = _cases(composition, frozenset(making))
     of_top = composition.ego
     found = [
-        _variant(scenario, making, case, ego, owners, built_in(ego), needs=len(cases) > 1)
+        _variant(scenario, making, case, ego, owners, labels, built_in(ego), needs=len(cases) > 1)
         for case in cases
         if (ego := _ego(making, case) if of_top is None else of_top) is not None
     ]
@@ -71,7 +74,7 @@ def with_variants(
     if ego is None:
         # whoever it is, it is one of the class that they all are
         return replace(found[0], variants=tuple(found))
-    base = _variant(scenario, making, common, ego, owners, built_in(ego), needs=False)
+    base = _variant(scenario, making, common, ego, owners, labels, built_in(ego), needs=False)
     return replace(base, variants=tuple(found))
 
 
@@ -109,23 +112,36 @@ def _cases(composition: Composition, making: _Begun) -> list[_Begun]:
 
 def _variant(
     scenario: Scenario, making: Mapping[int, ComposedScenario], case: _Begun, ego: int, owners: Mapping[int, int],
-    built_in: Sequence[Requirement], *, needs: bool,
+    labels: Sequence[str], built_in: Sequence[Requirement], *, needs: bool,
 ) -> Scenario:  # fmt: skip
     """The scenario with the objects of some scenarios."""
     of = {instance.index: number for number, each in making.items() for instance in each.objects}
-    kept = [each for each in scenario.objects if each.index not in of or of[each.index] in case]
+    late = [number for number in sorted(case) if making[number].is_late]
+    kept = [each for each in scenario.objects if each.index not in of or of[each.index] in case.difference(late)]
+    first = {each.index for each in kept}
+    kept += [each for number in late for each in scenario.objects if of.get(each.index) == number]
     places = {each.index: place for place, each in enumerate(kept)}
+    mine = Counter(labels[each.index] for each in kept)
+    alone = [labels[each.index] if mine[labels[each.index]] == 1 else "" for each in kept]
+    renamed = [_renamed(each, ego, place, alone[place]) for place, each in enumerate(kept)]
 
     def is_there(node: Node) -> bool:
-        return all(index in places or index < 0 or name == CLOCK for index, name in features(node))
+        return all(
+            index in places or index < 0 or name == CLOCK or name.startswith(PAST) for index, name in features(node)
+        )
 
     def put(node: Node) -> Node:
         if isinstance(node, Feature) and node.object >= 0:
-            return replace(node, object=places[ego if node.property == CLOCK else node.object])
+            # what no label says is said of whomever
+            mine = node.object if node.object in places and node.property != CLOCK else ego
+            return replace(node, object=places[mine])
         return node
 
-    own = [each for each in scenario.requirements if owners.get(id(each), -1) in (*case, -1)]
-    own += [each for each in built_in if all(index in places for index in each.objects)]
+    def required(*numbers: int) -> list[Requirement]:
+        return [each for each in scenario.requirements if owners.get(id(each), -1) in numbers]
+
+    own = required(-1, *case.difference(late))
+    own += [each for each in built_in if all(index in first for index in each.objects)]
     own = [replace(each, objects=tuple(places[index] for index in each.objects)) for each in own]
     dynamics = scenario.dynamics
     assert dynamics is not None
@@ -134,25 +150,42 @@ def _variant(
     # only a behavior ends a scenario that others run
     ended = {step.scenario for each in processes if not each.composes for step in each.steps if isinstance(step, Stop)}
     processes = tuple(_reachable(each, ended) if each.composes else each for each in processes)
+    every = any(_reachable(each, ended).terminates for each in dynamics.processes if each.composes)
     needed = tuple(sorted(case)) if needs else ()
+    changed = replace(dynamics, conditions=conditions, processes=processes, needs=needed, closes=every)
     found = replace(
         scenario,
-        objects=tuple(_renamed(each, ego, place) for place, each in enumerate(kept)),
+        objects=tuple(renamed[: len(first)]),
         ego=places[ego],
         requirements=tuple(each for each in own if is_there(each.condition)),
-        solid=tuple(places[index] for index in scenario.solid if index in places),
+        solid=tuple(places[index] for index in scenario.solid if index in first),
         soft=tuple(each for each in scenario.soft if is_there(each.condition)),
         records=tuple(each for each in scenario.records if is_there(each.value)),
-        dynamics=_without_silent(replace(dynamics, conditions=conditions, processes=processes, needs=needed)),
+        dynamics=_without_silent(changed),
+        arrivals=tuple(
+            Arrival(
+                tuple(at for at, each in enumerate(conditions) if _arrives(each, number)),
+                tuple(renamed[places[cast(int, each.index)]] for each in making[number].objects),
+                tuple(required(number)),
+            )
+            for number in late
+        ),
     )
     memo: dict[int, Node] = {}
     return rebuilt(found, lambda node: transform(node, put, memo))
 
 
-def _renamed(owner: ScenarioObject, ego: int, place: int) -> ScenarioObject:
-    """An object at its place; the ego alone is called so."""
-    name = "ego" if owner.index == ego else f"{owner.category}#{place}" if owner.name == "ego" else owner.name
-    return replace(owner, index=place, name=name)
+def _arrives(condition: Node, number: int) -> bool:
+    """Whether a condition stands for the beginning of a scenario."""
+    return isinstance(condition, Feature) and condition.property == f"{ARRIVES}{number}"
+
+
+def _renamed(owner: ScenarioObject, ego: int, place: int, label: str) -> ScenarioObject:
+    """An object at its place; the ego alone is called so, others by the variable that they alone were given to."""
+    name = f"{owner.category}#{place}" if owner.name == "ego" else owner.name
+    if label and label != "ego":
+        name = label
+    return replace(owner, index=place, name="ego" if owner.index == ego else name)
 
 
 def _process(

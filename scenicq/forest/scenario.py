@@ -11,7 +11,7 @@ from scenicq.errors import Diagnostic, Source, Span
 from scenicq.forest.nodes import Kind, Node
 from scenicq.forest.temporal import Dynamics
 
-__all__ = ["BuiltIn", "Property", "RecordedValue", "Requirement", "Scenario", "ScenarioObject"]
+__all__ = ["Arrival", "BuiltIn", "Property", "RecordedValue", "Requirement", "Scenario", "ScenarioObject"]
 
 
 class BuiltIn(StrEnum):
@@ -99,6 +99,21 @@ class RecordedValue:
 
 
 @dataclass(frozen=True, slots=True)
+class Arrival:
+    """What is asked of the sample at which a scenario begins that makes objects.
+
+    Attributes:
+        conditions: The conditions over time that stand for it, by number.
+        objects: The objects that it makes.
+        requirements: What it requires there.
+    """
+
+    conditions: tuple[int, ...]
+    objects: tuple[ScenarioObject, ...]
+    requirements: tuple[Requirement, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class Scenario:
     """A scenario compiled against one map.
 
@@ -119,6 +134,8 @@ class Scenario:
         dynamics: What it says about time; None for a static program, and where that is left out.
         variants: Where runs have other objects than others: the scenario of each case; it itself has those that are
             there in all of them.
+        arrivals: Scenarios that make objects after the first sample, in the order in which these are counted, behind
+            the others.
         as_written: Where expressions were rewritten to be matched, which keeps outcomes but not their probabilities:
             the scenario as the program has it, from which scenes are drawn.
     """
@@ -137,4 +154,10 @@ class Scenario:
     dynamics: Dynamics | None = None
     records: tuple[RecordedValue, ...] = ()
     variants: tuple[Scenario, ...] = field(default=(), repr=False)
+    arrivals: tuple[Arrival, ...] = ()
     as_written: Scenario | None = field(default=None, repr=False)
+
+    @property
+    def every_object(self) -> tuple[ScenarioObject, ...]:
+        """Its objects, and those that are made after the first sample."""
+        return (*self.objects, *(owner for each in self.arrivals for owner in each.objects))

@@ -13,7 +13,7 @@ from dataclasses import replace
 from typing import cast
 
 from scenicq.forest.nodes import Constant, Index, Node, PointIn, RegionUnion, Select, Undefined
-from scenicq.forest.scenario import Scenario
+from scenicq.forest.scenario import Requirement, Scenario, ScenarioObject
 from scenicq.forest.walk import children, postorder, transform
 from scenicq.geometry.regions import PolygonSet, Region, union
 
@@ -82,13 +82,19 @@ def _alternatives(pick: Select, by_chance: Callable[[Select], bool]) -> Iterator
 
 def rebuilt(scenario: Scenario, change: Callable[[Node], Node]) -> Scenario:
     """The scenario with each of its expressions changed."""
-    objects = tuple(
-        replace(owner, properties={name: replace(p, value=change(p.value)) for name, p in owner.properties.items()})
-        for owner in scenario.objects
-    )
-    requirements, soft = (
-        tuple(replace(each, condition=change(each.condition)) for each in conditions)
-        for conditions in (scenario.requirements, scenario.soft)
+
+    def changed(owner: ScenarioObject) -> ScenarioObject:
+        properties = {name: replace(p, value=change(p.value)) for name, p in owner.properties.items()}
+        return replace(owner, properties=properties)
+
+    def required(conditions: tuple[Requirement, ...]) -> tuple[Requirement, ...]:
+        return tuple(replace(each, condition=change(each.condition)) for each in conditions)
+
+    objects = tuple(map(changed, scenario.objects))
+    requirements, soft = required(scenario.requirements), required(scenario.soft)
+    arrivals = tuple(
+        replace(each, objects=tuple(map(changed, each.objects)), requirements=required(each.requirements))
+        for each in scenario.arrivals
     )
     params = {name: replace(p, value=change(p.value)) for name, p in scenario.params.items()}
     dynamics = scenario.dynamics
@@ -103,4 +109,5 @@ def rebuilt(scenario: Scenario, change: Callable[[Node], Node]) -> Scenario:
         params=params,
         dynamics=dynamics,
         records=records,
+        arrivals=arrivals,
     )

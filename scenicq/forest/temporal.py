@@ -26,6 +26,7 @@ __all__ = [
     "End",
     "Eventually",
     "Formula",
+    "GiveUp",
     "Goto",
     "IfRuns",
     "Leave",
@@ -232,6 +233,13 @@ class End:
 
 
 @dataclass(frozen=True, slots=True)
+class GiveUp:
+    """Nobody knows how the run goes on: it would need more objects than are counted."""
+
+    span: Span
+
+
+@dataclass(frozen=True, slots=True)
 class Begin:
     """A scenario begins, with its monitors and the behaviors of its objects; goes on within the same sample."""
 
@@ -299,6 +307,7 @@ ProcessStep: TypeAlias = (
     | Terminate
     | Reject
     | End
+    | GiveUp
     | Begin
     | CheckSample
     | Stop
@@ -377,6 +386,7 @@ class Dynamics:
             which they run.
         scenarios: Scenarios that begin within a run.
         needs: The numbers of those that have begun in every run that matches.
+        closes: Whether the program says when it ends, although no run with these objects comes to that.
     """
 
     conditions: tuple[Node, ...] = ()
@@ -385,6 +395,7 @@ class Dynamics:
     processes: tuple[Process, ...] = ()
     scenarios: tuple[SubScenario, ...] = ()
     needs: tuple[int, ...] = ()
+    closes: bool = False
 
     @property
     def every_requirement(self) -> tuple[TemporalRequirement, ...]:
@@ -394,7 +405,7 @@ class Dynamics:
     @property
     def terminates(self) -> bool:
         """Whether the program says when it ends."""
-        return bool(self.terminations) or any(process.terminates for process in self.processes)
+        return self.closes or bool(self.terminations) or any(process.terminates for process in self.processes)
 
     @property
     def time_limit_s(self) -> float | None:

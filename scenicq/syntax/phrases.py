@@ -185,6 +185,8 @@ OPERATORS: tuple[PhraseRow, ...] = (
     _row("apparent heading of {target} [from {origin=ego}]", PREFIX, measures="angle"),
     _row("distance to {target} [from {origin=ego}]", PREFIX, measures="length"),
     _row("distance from {origin} [to {target=ego}]", PREFIX, measures="length"),
+    _new("minimum distance to {target} [from {origin=ego}]", PREFIX, "`minimum distance`", measures="length"),
+    _new("minimum distance from {origin} [to {target=ego}]", PREFIX, "`minimum distance`", measures="length"),
     _row("distance past {target} [of {origin=ego}]", PREFIX, measures="length"),
     _row("angle to {target} [from {origin=ego}]", PREFIX, measures="angle"),
     _row("angle from {origin} [to {target=ego}]", PREFIX, measures="angle"),

@@ -279,7 +279,7 @@ class AtomColumns:
     def _definition(self, feature: Feature) -> Node | None:
         if is_moving(feature.property) or self._feature(feature) is not None:
             return None
-        return self.scenario.objects[feature.object].properties[feature.property].value
+        return self.scenario.every_object[feature.object].properties[feature.property].value
 
     def _truth(self, condition: Node, chosen: Mapping[int, int], counts: dict[int, NDArray[np.intp]]) -> Truth:
         found = self._quickly(condition)

@@ -16,7 +16,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from scenicq.budget import look
+from scenicq.budget import Exhausted, look
 from scenicq.errors import Span
 from scenicq.forest.among import properties_of_others
 from scenicq.forest.condition import expand
@@ -28,6 +28,7 @@ from scenicq.match.verdict import WitnessValue
 from scenicq.smt.answer import Solver
 from scenicq.store.track_block import TrackReach
 from scenicq.store.tracks import TrackKey
+from scenicq.temporal.arrivals import Arrivals, LabelOf
 from scenicq.temporal.atoms import AtomColumns, reads_start
 from scenicq.temporal.hidden import random_variables
 from scenicq.temporal.hidden_examples import InitialScene
@@ -141,12 +142,14 @@ class IntervalMatcher:
     def __post_init__(self) -> None:
         """Split off the choices."""
         self.outcomes = outcomes_of(self.scenario)
+        self._label: LabelOf | None = None
+        self._arrivals = Arrivals(self.scenario, self.match, self.solver) if self.scenario.arrivals else None
 
     @property
     def reach(self) -> TrackReach | None:
         """How much of the tracks of starts matters; None for all that follows."""
         dynamics = self.scenario.dynamics
-        if properties_of_others(self.scenario) is not None:
+        if properties_of_others(self.scenario) is not None or self.scenario.arrivals:
             return None
         if dynamics is None:
             return TrackReach(0.0, self.options.gap_s, gaps=True)
@@ -155,16 +158,28 @@ class IntervalMatcher:
         moving = all(is_moving(name) for _, name in features(*dynamics.conditions))
         return TrackReach(limit_s, self.options.gap_s) if limit_s is not None and moving else None
 
-    def intervals(self, table: StartTable, remember: Callable[[int], Remembered], *, every: bool = True) -> Reported:
+    def intervals(
+        self, table: StartTable, remember: Callable[[int], Remembered], *, every: bool = True,
+        label: LabelOf | None = None,
+    ) -> Reported:  # fmt: skip
         """What became of each binding: the intervals to report, or else the one that came furthest.
 
         Args:
             table: The starts.
             remember: The label of a start by its number, with who plays whom.
             every: Whether bindings without an interval are told of, too.
+            label: Makes labels of samples at which objects come.
         """
+        origin = np.arange(len(table))
+        self._label = label
+        if self._arrivals is not None and len(table):
+            try:
+                table, origin = self._arrivals.widened(table, self.options.gap_s, label)
+            except Exhausted as error:
+                return self._unknown(table, str(error))
         order, bindings = _sorted(table)
         table = table.chosen(order)
+        order = origin[order]
         parts: list[Runs] = []
         for outcome in cast("list[int]", np.unique(table.outcomes).tolist()):
             which = np.flatnonzero(table.outcomes == outcome)
@@ -184,6 +199,15 @@ class IntervalMatcher:
         found = Runs.joined(parts)
         found = replace(found, truth=np.minimum(found.truth, np.where(table.sure[found.of], TRUE, UNKNOWN)))
         return self._reported(found, table, order, bindings, every=every)
+
+    def _unknown(self, table: StartTable, reason: str) -> Reported:
+        """That nothing is known of any start."""
+        labels = np.unique(table.labels)
+        recordings = table.block.recording_of[labels]
+        firsts = np.array([first for first, _ in table.block.runs], dtype=np.int64)[recordings]
+        rows = zip((labels - firsts).tolist(), recordings.tolist(), strict=True)
+        found = [IntervalVerdict(at, at, int(UNKNOWN), (), recording, reason=reason) for at, recording in rows]
+        return Reported(found, len(table))
 
     def _followed(
         self, program: _Program, stretches: Stretches, table: StartTable, remember: Callable[[int], Remembered]
@@ -211,7 +235,10 @@ class IntervalMatcher:
         if random_variables(expanded):
             hidden = HiddenRuns(program.machine, program.initial, self.reasons)
             return hidden.follow(stretches, columns, expanded, remember)
-        return follow_runs(program.machine, stretches, columns.reader(expanded))
+        given: Mapping[int, Truth] = {}
+        if self._arrivals is not None:
+            given = self._arrivals.truths(stretches.places, stretches.bounds, self._label)
+        return follow_runs(program.machine, stretches, columns.reader(expanded, given))
 
     def _reported(
         self, found: Runs, table: StartTable, order: NDArray[np.int64], bindings: NDArray[np.int64], *, every: bool

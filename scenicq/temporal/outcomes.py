@@ -74,7 +74,7 @@ def steady_value(scenario: Scenario, feature: Feature) -> Node | None:
     """What the program says of a property that does not change, should no label tell."""
     if is_moving(feature.property):
         return None
-    return scenario.objects[feature.object].properties[feature.property].value
+    return scenario.every_object[feature.object].properties[feature.property].value
 
 
 def _choice(scenario: Scenario) -> tuple[Leaf, range] | None:

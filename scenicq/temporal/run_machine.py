@@ -25,6 +25,7 @@ from scenicq.forest.temporal import (
     Dynamics,
     End,
     Formula,
+    GiveUp,
     Goto,
     IfRuns,
     Leave,
@@ -464,6 +465,8 @@ class RunMachine:
                 case End():
                     now.places[number] = _OVER
                     return False
+                case GiveUp():
+                    raise exhausted("scenario_starts")
                 case _:
                     assert_never(step)
         if at >= 0:

@@ -181,7 +181,7 @@ class StartSearch:
                 chosen = np.flatnonzero(may[role] & ~out[place])
                 where = place[chosen]
                 members = {scenario.ego: block.ego(label_of[chosen]), role: candidates.members[chosen]}
-            holds, first_broken = self._plain(
+            holds, first_broken = self.plain_truth(
                 BoundSamples(block, members, len(where), classes=self.matcher.options.classes), requirements
             )
             kept = np.zeros(n, np.bool_)
@@ -207,7 +207,7 @@ class StartSearch:
         left[decided] = False
         return Starts(starts, narrowed(candidates, left, place), sure[left], failed)
 
-    def _plain(self, places: BoundSamples, requirements: Sequence[Requirement]) -> tuple[Truth, NDArray[np.int64]]:
+    def plain_truth(self, places: BoundSamples, requirements: Sequence[Requirement]) -> tuple[Truth, NDArray[np.int64]]:
         """Whether all requirements hold at each place, and the number of the first that does not, -1 if none."""
         holds = np.full(len(places), TRUE)
         broken = np.full(len(places), -1)
@@ -236,7 +236,7 @@ class StartSearch:
         if not self._arrays or not len(labels) or self._odd(block):
             return none, np.empty(0, np.int64)
         where, members = self._tuples(block, candidates, labels)
-        holds, fails, members = self._in_closed_form(block, members, len(where))
+        holds, fails, members = self.in_closed_form(block, members, len(where))
         unclear = np.unique(where[~holds & ~fails])
         clear = np.flatnonzero(holds & ~np.isin(where, unclear))
         decided = np.unique(where[clear])
@@ -290,7 +290,7 @@ class StartSearch:
             members = {other: mine[distinct] for other, mine in members.items()} | {index: picked[distinct]}
         return where, {scenario.ego: egos[where], **members}
 
-    def _in_closed_form(
+    def in_closed_form(
         self, block: TrackBlock, members: Mapping[int, Members], size: int
     ) -> tuple[NDArray[np.bool_], NDArray[np.bool_], dict[int, Members]]:
         """Whether each choice of label objects surely matches, and whether it surely does not.

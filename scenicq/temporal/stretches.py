@@ -16,7 +16,7 @@ from scenicq.store.classes import Granularity
 from scenicq.store.track_block import TrackBlock
 from scenicq.temporal.samples import BoundSamples
 
-__all__ = ["StartTable", "Stretches", "Timeline", "stretches_of"]
+__all__ = ["StartTable", "Stretches", "Timeline", "TracksSeen", "stretches_of"]
 
 Members = NDArray[np.int64]
 _AT_ONCE = 400_000
@@ -155,8 +155,10 @@ def stretches_of(table: StartTable, gap_s: float, *, apart: bool, classes: Granu
         return
     block, labels = table.block, table.labels
     tracks = {index: block.tracks(mine) for index, mine in table.members.items()}
-    seen = _Seen(block, np.unique(np.concatenate([*tracks.values()])), gap_s)
-    ends = np.minimum.reduce([seen.life_ends(mine, labels) for mine in tracks.values()])
+    seen = TracksSeen(block, np.unique(np.concatenate([*tracks.values()])), gap_s)
+    # who comes later is there at another label
+    lives = {index: seen.life_ends(tracks[index], block.label_of[mine]) for index, mine in table.members.items()}
+    ends = np.minimum.reduce(list(lives.values()))
     changes = np.full(len(table), apart)
     changes[0] = True
     for mine in (*tracks.values(), ends):
@@ -171,7 +173,10 @@ def stretches_of(table: StartTable, gap_s: float, *, apart: bool, classes: Granu
         bounds = np.concatenate(([0], np.cumsum(sizes)))
         which = np.repeat(np.arange(len(sizes)), sizes)
         at: Members = labels[heads[first:last]][which] + np.arange(int(bounds[-1])) - bounds[which]
-        members = {index: seen.members(mine[heads[first:last]][which], at) for index, mine in tracks.items()}
+        members = {
+            index: seen.members_of_life(mine[heads[first:last]][which], at, lives[index][heads[first:last]][which])
+            for index, mine in tracks.items()
+        }
         low, high = int(heads[first]), int(heads[last]) if last < len(heads) else len(table)
         mine = np.searchsorted(heads, np.arange(low, high), side="right") - 1 - first
         starts = bounds[mine] + labels[low:high] - labels[heads[first + mine]]
@@ -182,7 +187,7 @@ def stretches_of(table: StartTable, gap_s: float, *, apart: bool, classes: Granu
         first = last
 
 
-class _Seen:
+class TracksSeen:
     """Where some tracks are seen: a row for each, of the samples from its first to its last."""
 
     def __init__(self, block: TrackBlock, wanted: Members, gap_s: float) -> None:
@@ -214,6 +219,13 @@ class _Seen:
         within = (self._first[row] <= labels) & (labels <= self._last[row])
         found = np.full(len(labels), -1)
         found[within] = self._table[self._base[row[within]] + labels[within]]
+        return found
+
+    def members_of_life(self, tracks: Members, labels: Members, ends: Members) -> Members:
+        """Who is of a track at a label, in its life that ends with another one; -1 where nobody is."""
+        found = self.members(tracks, labels)
+        there = np.flatnonzero(found >= 0)
+        found[there[self.life_ends(tracks[there], labels[there]) != ends[there]]] = -1
         return found
 
     def life_ends(self, tracks: Members, labels: Members) -> Members:

@@ -1,8 +1,12 @@
 """Every operator of the language paper's appendix B against its formula, computed here by plain mathematics."""
 
 import math
+import random
 
 import pytest
+from shapely.affinity import rotate as turned
+from shapely.affinity import translate
+from shapely.geometry import box
 
 from .scenes import (
     EGO,
@@ -163,3 +167,23 @@ def test_requirements_see_the_ego_and_the_names_of_their_moment() -> None:
 )
 def test_what_has_no_meaning_is_refused(expression: str, code: str) -> None:
     assert refused(f"{BEFORE}param answer = {expression}\n")[0] == code
+
+
+@pytest.mark.parametrize("asked", ["to other", "from other", "to other from ego", "from ego to other"])
+def test_minimum_distance_is_that_of_boxes(asked: str) -> None:
+    """As shapely has it of both boxes."""
+    draw = random.Random(asked)
+    for _ in range(6):
+        places = [(draw.uniform(-6, 6), draw.uniform(-6, 6), draw.uniform(-180, 180)) for _ in range(2)]
+        sizes = [(draw.uniform(1, 4), draw.uniform(1, 4)) for _ in range(2)]
+        made = [
+            f"new Object at ({x}, {y}), facing {turn} deg, with width {width}, with length {length}, "
+            "with allowCollisions True, with requireVisible False"
+            for (x, y, turn), (width, length) in zip(places, sizes, strict=True)
+        ]
+        text = f"ego = {made[0]}\nother = {made[1]}\nparam apart = (minimum distance {asked})\n"
+        boxes = [
+            translate(turned(box(-w / 2, -h / 2, w / 2, h / 2), turn, origin=(0, 0)), x, y)
+            for (x, y, turn), (w, h) in zip(places, sizes, strict=True)
+        ]
+        assert drawn(text)[1].params["apart"] == pytest.approx(boxes[0].distance(boxes[1]), abs=1e-9)

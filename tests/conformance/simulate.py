@@ -119,6 +119,8 @@ class Simulations:
         except Exception as error:  # whatever Scenic says of the program is its answer
             return {"error": f"{type(error).__name__}: {error}"}
         self._scene = scene
+        # scenarios may make more, with the first step
+        first += [thing(each) for each in done.objects[len(first) :]]
         return {
             "objects": first,
             "states": done.trajectory,

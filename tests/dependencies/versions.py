@@ -95,17 +95,14 @@ def must(*words: object) -> str:
     return done.stdout.decode()
 
 
-def make_environment(folder: Path, *, lowest: bool, pre: bool) -> Path:
-    """Install the package into an environment of its own; the folder of its commands."""
+def make_environment(folder: Path, package: Path, *, lowest: bool, pre: bool) -> Path:
+    """Install the package, an archive or a wheel, into an environment of its own; the folder of its commands."""
     shutil.rmtree(folder, ignore_errors=True)
     must(sys.executable, "-m", "venv", folder)
     bin_ = folder / ("Scripts" if os.name == "nt" else "bin")
     pip = (bin_ / "python", "-m", "pip", "--disable-pip-version-check")
     must(*pip, "install", "-q", "--prefer-binary", *["--pre"] * pre, *requirements(lowest))
-    with tempfile.TemporaryDirectory() as scratch:
-        archive, wheel = build_archives(Path(scratch))
-        # the one is installed from its own bytes, the other from those of the wheel that is made of it
-        must(*pip, "install", "-q", "--no-deps", archive if lowest else wheel)
+    must(*pip, "install", "-q", "--no-deps", package)
     found = {each["name"].lower(): each["version"] for each in json.loads(must(*pip, "list", "--format", "json"))}
     assert "pandas" not in found, "pandas is what some packages need without saying so"
     must(*pip, "check")
@@ -170,8 +167,12 @@ def main() -> None:
         town = Path(scratch, "of-all")
         must(here / "scenicq", "ingest", SAMPLES / "crossroads", town, "-q")
 
+        # the one is installed from its own bytes, the other from those of the wheel that is made of it
+        packages = dict(zip(("oldest", "newest"), build_archives(Path(scratch)), strict=True))
+
         def there(which: str) -> dict[str, object]:
-            bin_ = make_environment(ROOT / f".venv-{which}", lowest=which == "oldest", pre=given.pre)
+            folder = ROOT / f".venv-{which}"
+            bin_ = make_environment(folder, packages[which], lowest=which == "oldest", pre=given.pre)
             return answers(bin_, Path(scratch, which), town)
 
         ours = pool.submit(answers, here, Path(scratch, "here"), town)

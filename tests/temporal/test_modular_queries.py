@@ -1,5 +1,6 @@
 """Programs made of scenarios against programs that say the same without: each finds what the others find together."""
 
+import math
 import random
 
 import pytest
@@ -204,12 +205,17 @@ def found(folder, text, behaviors="guards", **options):
 
 
 @pytest.fixture(scope="module")
-def traces(tmp_path_factory):
+def drawn(tmp_path_factory):
     draw = random.Random(5)
     folder = tmp_path_factory.mktemp("modular") / "dataset"
-    recordings = [recording_of(f"r{number:02}", random_trace(draw, gaps=False)) for number in range(12)]
-    write_dataset(folder, recordings, {}, name="d")
-    return folder
+    traces = {f"r{number:02}": random_trace(draw, gaps=False) for number in range(12)}
+    write_dataset(folder, [recording_of(*each) for each in traces.items()], {}, name="d")
+    return folder, traces
+
+
+@pytest.fixture(scope="module")
+def traces(drawn):
+    return drawn[0]
 
 
 @pytest.mark.parametrize("name", SAME)
@@ -224,3 +230,85 @@ def test_scenarios_find_what_plain_programs_find(name, intervals, traces):
     # in the order of recordings and time
     assert [each[:1] for each in mine] == sorted(each[:1] for each in mine)
     assert mine == found(traces, modular, time=time, prefilter=False)
+
+
+LATER = f"""
+scenario Main():
+    setup:
+        ego = {CARS}
+    compose:
+        wait
+        do Sub()
+scenario Sub():
+    setup:
+        a = {CARS}
+        require (distance from a to ego) < 6
+        require always a.position.x < 4
+        terminate after 1 seconds
+"""
+
+
+def first_at(trace, k, seconds):
+    """The first sample so many seconds after one; None where the recording ends before."""
+    return next((j for j in range(k + 1, len(trace)) if trace[j].time - trace[k].time >= seconds - 1e-6), None)
+
+
+def test_an_object_that_comes_later_is_bound_from_then_on(drawn):
+    folder, traces = drawn
+    expected = []
+    for name, trace in traces.items():
+        for start in range(len(trace) - 1):
+            end = first_at(trace, start + 1, 1.0)
+            for track in sorted(trace[0].seen.keys() - {"ego"}):
+                near = math.dist(trace[start + 1].seen[track], trace[start + 1].seen["ego"]) < 6
+                if end is None or not near:
+                    continue
+                if all(trace[k].seen[track][0] < 4 for k in range(start + 1, end + 1)):
+                    roles = (("a", track), ("ego", "ego"))
+                    expected.append((name, f"{name}-{start}", f"{name}-{end}", "Match", roles))
+    assert len(expected) > 5
+    mine = found(folder, LATER, time=IntervalOptions(intervals="all"))
+    assert sorted(mine) == sorted(expected)
+
+
+PLACED = f"""
+scenario Main():
+    setup:
+        ego = {CARS}
+    compose:
+        wait until ego.position.x > 0
+        do Sub()
+scenario Sub():
+    setup:
+        a = new Car at ego.position + (Range(-3, 3), Range(-2, 2)), facing 0 deg
+        terminate after 0.5 seconds
+"""
+
+
+def test_where_an_object_comes_is_asked_where_it_comes(drawn):
+    folder, traces = drawn
+    expected = []
+    for name, trace in traces.items():
+        for start in range(len(trace)):
+            begins = next((k for k in range(start, len(trace)) if trace[k].seen["ego"][0] > 0), None)
+            end = None if begins is None else first_at(trace, begins, 0.5)
+            for track in sorted(trace[0].seen.keys() - {"ego"}):
+                if end is None:
+                    continue
+                x, y = (a - b for a, b in zip(trace[begins].seen[track], trace[begins].seen["ego"], strict=True))
+                if abs(x) <= 3.2 and abs(y) <= 2.2:
+                    roles = (("a", track), ("ego", "ego"))
+                    expected.append((name, f"{name}-{start}", f"{name}-{end}", "Match", roles))
+    assert len(expected) > 3
+    mine = found(folder, PLACED, time=IntervalOptions(intervals="all"))
+    assert sorted(mine) == sorted(expected)
+
+
+def test_a_scenario_that_begins_again_makes_another_object(drawn):
+    folder, _ = drawn
+    again = LATER.replace("        do Sub()\n", "        do Sub()\n        do Sub()\n").replace("1 sec", "0.5 sec")
+    results = found(folder, again, time=IntervalOptions(intervals="all"))
+    assert results
+    for *_, roles in results:
+        assert len(roles) == 3
+        assert len({track for _, track in roles}) == 3

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scenicq.budget import look
 from scenicq.errors import Span
 from scenicq.forest.among import properties_of_others
+from scenicq.forest.scenario import Scenario
 from scenicq.match.matcher import Matcher
 from scenicq.match.problem.constraints import relevant_properties
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown, Verdict, WitnessValue
@@ -203,7 +204,10 @@ class RecordingMatcher:
                 members = {index: int(mine[number]) for index, mine in table.members.items()}
                 return label_of(self.matcher.scenario, block, members, rows.map, self._relevant)
 
-            reported = self.intervals.intervals(table, remember, every=self.every)
+            def label(scenario: Scenario, members: Mapping[int, int], relevant: Sequence[frozenset[str]]) -> Remembered:
+                return label_of(scenario, block, members, rows.map, relevant)
+
+            reported = self.intervals.intervals(table, remember, every=self.every, label=label)
             look()
             intervals = reported.intervals
             found.counts["bindings"] += reported.bindings
@@ -339,12 +343,13 @@ class RecordingMatcher:
         first = firsts + np.array([each.start for each in intervals], dtype=np.int64)
         last = firsts + np.array([each.end for each in intervals], dtype=np.int64)
         names = {each: block.name(each) for each in cast("list[int]", np.unique(recordings).tolist())}
-        objects = [owner.name for owner in scenario.objects]
+        objects = [owner.name for owner in scenario.every_object]
         start_us, end_us = (cast("list[int]", block.times_us[labels].tolist()) for labels in (first, last))
         pairs = zip(intervals, told, strict=True)
         found = zip(pairs, block.frames(first), block.frames(last), start_us, end_us, strict=True)
         for (each, who), frame, last_frame, begins_us, ends_us in found:
-            roles = {objects[index]: _named(track) for index, track in sorted(who.tracks.items())}
+            tracks = {**dict(each.binding[len(scenario.objects) :]), **who.tracks}
+            roles = {objects[index]: _named(track) for index, track in sorted(tracks.items())}
             verdict: Verdict
             if each.truth == TRUE:
                 verdict = Match(roles, {**witnesses.get(each.origin, {}), **each.witness})

@@ -83,9 +83,12 @@ def bands_of(scenario: Scenario, over: KnownConditions) -> tuple[Band, ...]:
     columns, known = over.columns, over.truths
     found: list[Band] = []
 
+    arrivals = {number for each in scenario.arrivals for number in each.conditions}
+
     def add(number: int, what: str = "") -> None:
         condition = dynamics.conditions[number]
-        if number in known:
+        # no label says where objects come
+        if number in known and number not in arrivals:
             values = tuple(known[number].tolist())
             told = what or _named(condition, number)
             found.append(Band(told, condition.span, values, sides=_sides(columns, condition)))
@@ -103,7 +106,7 @@ def bands_of(scenario: Scenario, over: KnownConditions) -> tuple[Band, ...]:
         if termination.condition is not None:
             add(termination.condition.number, " ".join(termination.span.text.split()))
     for process in dynamics.processes:
-        who = "" if process.object is None else scenario.objects[process.object].name
+        who = "" if process.object is None else scenario.every_object[process.object].name
         for number, what in _asked(process, dynamics.conditions, who).items():
             add(number, what)
     return tuple(found)
@@ -123,7 +126,7 @@ def show_activities(
         until = seconds[min(each.end + 1, len(seconds) - 1)]
         text = _short(" ".join(each.what.text.split()))
         lines.setdefault(each.object, []).append(f"{text} {seconds[each.start]:.1f}-{until:.1f} s")
-    return [f"{scenario.objects[index].name}: {', '.join(told)}" for index, told in lines.items()]
+    return [f"{scenario.every_object[index].name}: {', '.join(told)}" for index, told in lines.items()]
 
 
 def _asked(process: Process, conditions: Sequence[Node], who: str) -> dict[int, str]:

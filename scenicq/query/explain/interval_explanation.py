@@ -247,7 +247,7 @@ def _explain_variant(
         example = examples.get(rarest, "")
         return IntervalExplanation(tracks, None, failed=failed, example=example, undecided=undecided)
     best = max(results, key=lambda each: (each.truth, each.cut_off, each.end - each.start))
-    roles = tuple((scenario.objects[index].name, track[1] or "ego") for index, track in best.binding)
+    roles = tuple((scenario.every_object[index].name, track[1] or "ego") for index, track in best.binding)
     # one of several variants is not tried again by itself
     tried = () if query.compiled_map(labels[0].map).scenario.variants else changes_of(scenario, tracks, best)
     shifts = [shift_comparison(each, best.broken) for each in tried[: LIMITS.ranked_numbers]]
@@ -389,7 +389,9 @@ def placed(query: Query, result: Result) -> tuple[Scenario, RecordingTracks, Int
         tracks = reader.read(first, end)
     verdict = result.verdict
     roles = verdict.partial if isinstance(verdict, NoMatch) else verdict.correspondence
-    indices = {owner.name: owner.index for owner in scenario.objects}
+    alike = (each for each in scenario.variants if {owner.name for owner in each.every_object} == set(roles))
+    scenario = next(alike, scenario)
+    indices = {owner.name: owner.index for owner in scenario.every_object}
     binding = tuple((indices[name], _key(tracks, track)) for name, track in roles.items())
     start, last = tracks.frames.index(result.frame), tracks.frames.index(result.interval.last)
     truth = int(TRUE if isinstance(verdict, Match) else FALSE if isinstance(verdict, NoMatch) else UNKNOWN)
