@@ -18,6 +18,7 @@ from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, cast
 
+from scenicq.compiler.assignment import assign
 from scenicq.compiler.coerce import read_over_time
 from scenicq.compiler.coroutines import CoroutineCall, NotBegun, ScenarioCall, ScenarioDefinition, as_behavior
 from scenicq.compiler.environment import Environment
@@ -150,6 +151,13 @@ class ComposedScenario:
 
 
 @dataclass(frozen=True, eq=False)
+class DelayedCall:
+    """A call of a scenario that takes what another one makes, which has not begun yet."""
+
+    call: ast.Call
+
+
+@dataclass(frozen=True, eq=False)
 class Composition:
     """What composes scenarios, followed.
 
@@ -187,6 +195,7 @@ class CompositionGraph(ProcessGraph):
     scenarios: list[ComposedScenario] = field(default_factory=list[ComposedScenario])
     has_setup: bool = field(default=True, kw_only=True)
     _known: dict[Hashable, ComposedScenario] = field(default_factory=dict["Hashable", "ComposedScenario"])
+    _delayed: dict[ast.Assign, DelayedCall] = field(default_factory=dict[ast.Assign, "DelayedCall"])
     _overrides: dict[Hashable, tuple[int, Sequence[tuple[GraphGuards, Node, Span]]]] = field(
         default_factory=dict["Hashable", "tuple[int, Sequence[tuple[GraphGuards, Node, Span]]]"]
     )
@@ -288,8 +297,18 @@ class CompositionGraph(ProcessGraph):
     def simple(self, state: ProcessState, node: ast.Statement, rest: ProcessState) -> Following:
         """Run a statement that only computes, over the names and the ego of a scenario."""
         base = super().simple
-        with self._drawn_by_scene(state):
-            return self._as_seen(state, lambda: base(state, node, rest))
+        try:
+            with self._drawn_by_scene(state):
+                return self._as_seen(state, lambda: base(state, node, rest))
+        except NotBegun:
+            if not isinstance(node, ast.Assign) or not isinstance(node.value, ast.Call):
+                raise
+            # what it takes is there when it begins
+            number = self.call_of(state)
+            names, delayed = self.scope(state, number), self._delayed.setdefault(node, DelayedCall(node.value))
+            for target in node.targets:
+                assign(self.run, target, delayed, names)
+            return self.with_names(rest, number, names, node.span)
 
     def _drawn_by_scene(self, state: ProcessState) -> _Drawing:
         """While something is evaluated: at the first sample, what it draws is the scene's."""
@@ -346,6 +365,8 @@ class CompositionGraph(ProcessGraph):
             value = first.value
         else:
             value, guards = self.evaluated(state, first)
+        if isinstance(value, DelayedCall):
+            value, guards = self.evaluated(state, value.call)
         after = replace(node, waiting=tuple(others))
         is_named = isinstance(first, Held) or not isinstance(first, ast.Call)
         found = self._entered(state, self.as_done(value, node.span), after, rest, is_named=is_named)
