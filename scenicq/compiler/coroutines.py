@@ -16,7 +16,7 @@ from scenicq.syntax import ast
 
 __all__ = [
     "BehaviorDefinition", "CoroutineCall", "CoroutineDefinition", "LibraryCall", "LibraryName", "MonitorDefinition",
-    "as_behavior",
+    "as_behavior", "beside_blocks",
 ]  # fmt: skip
 
 
@@ -66,6 +66,17 @@ def _is_block(node: ast.Statement) -> TypeGuard[ast.DynamicDefinition]:
 
 def _is_guard(node: ast.Statement) -> bool:
     return isinstance(node, ast.DynamicStatement) and node.kind in ("precondition", "invariant")
+
+
+def beside_blocks(body: tuple[ast.Statement, ...]) -> list[ast.Statement]:
+    """What stands in a scenario beside its blocks, where it has any: neither a condition nor a text that explains."""
+    if not any(map(_is_block, body)):
+        return []
+    return [each for each in body if not (_is_block(each) or _is_guard(each) or _is_text(each))]
+
+
+def _is_text(node: ast.Statement) -> bool:
+    return isinstance(node, ast.ExpressionStatement) and isinstance(node.value, ast.LiteralValue)
 
 
 class NotBegun(ScenarioError):

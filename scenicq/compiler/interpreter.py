@@ -14,7 +14,13 @@ from scenicq.compiler.assignment import assign
 from scenicq.compiler.classes import bind_arguments, define_class, refuse_decorators
 from scenicq.compiler.coerce import to_region, to_scalar
 from scenicq.compiler.comparisons import binary, iterate
-from scenicq.compiler.coroutines import CoroutineCall, CoroutineDefinition, ScenarioCall, ScenarioDefinition
+from scenicq.compiler.coroutines import (
+    CoroutineCall,
+    CoroutineDefinition,
+    ScenarioCall,
+    ScenarioDefinition,
+    beside_blocks,
+)
 from scenicq.compiler.courses import Course
 from scenicq.compiler.deviations import deviation, leaves_the_plane
 from scenicq.compiler.element_lookups import LaneRule, Lookups
@@ -356,6 +362,9 @@ class Interpreter:
             case ast.DynamicStatement(kind="record" | "record initial" | "record final"):
                 record_statement(self, node, scope)
             case ast.DynamicDefinition(kind="scenario"):
+                if lines := beside_blocks(node.body):
+                    raise fail("parse-error", "a scenario with blocks has nothing else", lines[0].span,
+                               "beside the blocks", ("write it in the `setup` block",))  # fmt: skip
                 made = self.make_function(node.name, node.parameters, node.body, scope, node.span)
                 scope.set(
                     node.name,
