@@ -18,10 +18,15 @@ from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, cast
 
-from scenicq.compiler.assignment import assign
 from scenicq.compiler.coerce import read_over_time
-from scenicq.compiler.coroutines import CoroutineCall, NotBegun, ScenarioCall, ScenarioDefinition, as_behavior
-from scenicq.compiler.environment import Environment
+from scenicq.compiler.coroutines import (
+    CoroutineCall,
+    DelayedCall,
+    NotBegun,
+    ScenarioCall,
+    ScenarioDefinition,
+    as_behavior,
+)
 from scenicq.compiler.local_values import Held, LocalValues
 from scenicq.compiler.modular import SetUp, set_up
 from scenicq.compiler.overrides import overridden
@@ -151,13 +156,6 @@ class ComposedScenario:
 
 
 @dataclass(frozen=True, eq=False)
-class DelayedCall:
-    """A call of a scenario that takes what another one makes, which has not begun yet."""
-
-    call: ast.Call
-
-
-@dataclass(frozen=True, eq=False)
 class Composition:
     """What composes scenarios, followed.
 
@@ -195,7 +193,6 @@ class CompositionGraph(ProcessGraph):
     scenarios: list[ComposedScenario] = field(default_factory=list[ComposedScenario])
     has_setup: bool = field(default=True, kw_only=True)
     _known: dict[Hashable, ComposedScenario] = field(default_factory=dict["Hashable", "ComposedScenario"])
-    _delayed: dict[ast.Assign, DelayedCall] = field(default_factory=dict[ast.Assign, "DelayedCall"])
     _overrides: dict[Hashable, tuple[int, Sequence[tuple[GraphGuards, Node, Span]]]] = field(
         default_factory=dict["Hashable", "tuple[int, Sequence[tuple[GraphGuards, Node, Span]]]"]
     )
@@ -254,27 +251,20 @@ class CompositionGraph(ProcessGraph):
         begun = (self.scenarios[number].made.ego for _, number in state.begun)
         return next((each for each in begun if each is not None), None)
 
-    def scope(self, state: ProcessState, number: int) -> Environment:
-        """The names that a call sees; scenarios that have begun have what they have made."""
-        found = super().scope(state, number)
-        found.names.update({name: self._with_names(value, state) for name, value in found.names.items()})
-        return found
-
-    def _with_names(self, value: ModelValue, state: ProcessState) -> ModelValue:
-        if not isinstance(value, ScenarioCall):
-            return value
-        begun = dict(state.begun)
-        number = begun.get(self.values.hold(value).key)
-        return replace(value, names=None if number is None else self.scenarios[number].names)
-
     def _as_seen(self, state: ProcessState, work: Callable[[], ModelValue]) -> ModelValue:
         """What is worked out with the ego of the scenario that goes on; it makes no objects."""
-        run, before, count = self.run, self.run.current_ego, len(self.run.objects)
-        run.current_ego = self.ego_of(state)
+        run, before, count = self.run, (self.run.current_ego, self.run.begun), len(self.run.objects)
+        begun = dict(state.begun)
+
+        def names(call: ScenarioCall) -> Mapping[str, ModelValue] | None:
+            number = begun.get(self.values.hold(call).key)
+            return None if number is None else self.scenarios[number].names
+
+        run.current_ego, run.begun = self.ego_of(state), names
         try:
             found = work()
         finally:
-            run.current_ego = before
+            run.current_ego, run.begun = before
         if len(run.objects) > count:
             raise fail("unsupported-construct", "an object cannot be made here", run.objects[count].span,
                        "within a compose block", ("make it in a `setup` block",))  # fmt: skip
@@ -297,18 +287,8 @@ class CompositionGraph(ProcessGraph):
     def simple(self, state: ProcessState, node: ast.Statement, rest: ProcessState) -> Following:
         """Run a statement that only computes, over the names and the ego of a scenario."""
         base = super().simple
-        try:
-            with self._drawn_by_scene(state):
-                return self._as_seen(state, lambda: base(state, node, rest))
-        except NotBegun:
-            if not isinstance(node, ast.Assign) or not isinstance(node.value, ast.Call):
-                raise
-            # what it takes is there when it begins
-            number = self.call_of(state)
-            names, delayed = self.scope(state, number), self._delayed.setdefault(node, DelayedCall(node.value))
-            for target in node.targets:
-                assign(self.run, target, delayed, names)
-            return self.with_names(rest, number, names, node.span)
+        with self._drawn_by_scene(state):
+            return self._as_seen(state, lambda: base(state, node, rest))
 
     def _drawn_by_scene(self, state: ProcessState) -> _Drawing:
         """While something is evaluated: at the first sample, what it draws is the scene's."""

@@ -15,8 +15,8 @@ from scenicq.errors import ScenarioError, Span
 from scenicq.syntax import ast
 
 __all__ = [
-    "BehaviorDefinition", "CoroutineCall", "CoroutineDefinition", "LibraryCall", "LibraryName", "MonitorDefinition",
-    "as_behavior", "beside_blocks",
+    "BehaviorDefinition", "CoroutineCall", "CoroutineDefinition", "DelayedCall", "LibraryCall", "LibraryName",
+    "MonitorDefinition", "NotBegun", "ScenarioCall", "ScenarioDefinition", "as_behavior", "beside_blocks",
 ]  # fmt: skip
 
 
@@ -100,13 +100,14 @@ class CoroutineCall:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ScenarioCall(CoroutineCall):
-    """A call of a scenario.
+    """A call of a scenario."""
 
-    Attributes:
-        names: What it has made, by name; None before it begins.
-    """
 
-    names: Mapping[str, ModelValue] | None = None
+@dataclass(frozen=True, slots=True, eq=False)
+class DelayedCall:
+    """A call of a scenario that takes what another one makes, which has not begun yet."""
+
+    call: ast.Call
 
 
 @dataclass(frozen=True, slots=True, eq=False)
