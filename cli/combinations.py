@@ -26,8 +26,8 @@ _EXCLUDES = {
     ("shard", "rank"): "",
     ("shard", "sample"): "",
     ("shard", "advise"): "",
-    ("shard", "where"): "",
-    ("shard", "sort"): "",
+    ("shard", "where"): _AFTERWARDS,
+    ("shard", "sort"): _AFTERWARDS,
     ("rank", "sort"): "",
 }
 """Two options that cannot be combined, and what to do instead."""

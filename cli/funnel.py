@@ -2,18 +2,56 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+import random
+from collections.abc import Collection, Generator
+from contextlib import closing
+from dataclasses import dataclass, field
 
 import click
 
 from scenicq.errors import Diagnostic
 from scenicq.forest.scenario import BuiltIn
-from scenicq.query.execution.results import Funnel
+from scenicq.match.verdict import Match
+from scenicq.query.execution.results import Funnel, Result
 from scenicq.query.execution.run import Query
 
 from .report import columns, count, show
 
-__all__ = ["show_funnel"]
+__all__ = ["MatchSample", "show_funnel"]
+
+_BUDGET_S = 1.0
+"""Seconds for what nobody asked for."""
+_SAMPLE = 200
+"""Frames of which that is told at most."""
+
+
+@dataclass(slots=True)
+class MatchSample:
+    """Some of the frames that match, each with the same chance, gathered as results come.
+
+    Attributes:
+        frames: Their names.
+        of: How many there were.
+    """
+
+    frames: list[str] = field(default_factory=list[str])
+    of: int = 0
+    _last: str = ""
+    _draw: random.Random = field(default_factory=lambda: random.Random(0))
+
+    def gathered(self, results: Generator[Result]) -> Generator[Result]:
+        """The same results."""
+        with closing(results):
+            for each in results:
+                # correspondences of one frame come together
+                if isinstance(each.verdict, Match) and each.frame != self._last:
+                    self._last = each.frame
+                    self.of += 1
+                    if len(self.frames) < _SAMPLE:
+                        self.frames.append(each.frame)
+                    elif (place := self._draw.randrange(self.of)) < _SAMPLE:
+                        self.frames[place] = each.frame
+                yield each
 
 
 def _steps(query: Query) -> list[tuple[str, str]]:
@@ -73,17 +111,52 @@ def _broken(funnel: Funnel) -> list[str]:
     return columns([("then failed at", "bindings"), *rows], right=frozenset({1})) if rows else []
 
 
-def show_funnel(query: Query, elapsed_s: float, told: Collection[Diagnostic]) -> None:
+def _defaults(query: Query) -> list[str]:
+    """What the directions of the world model leave out, of which the program says nothing."""
+    compiled, excluded = next(query.fitting(), None), query.funnel.excluded
+    if compiled is None:
+        return []
+    owners = [each for each in compiled.scenario.objects if not each.properties["heading"].explicit]
+    left_out = {f"{each.name}.heading": excluded[f"{each.name}.heading"] for each in owners}
+    named = [name for name, number in left_out.items() if number]
+    if not named:
+        return []
+    frames = sum(left_out.values())
+    names = ", ".join(f"`{name}`" for name in named)
+    return [
+        f"  {count(frames, 'frame')} failed first at {names}, of which the program says nothing: by default it is",
+        "    that of the road; `facing Range(-180, 180) deg` takes any direction",
+    ]
+
+
+def _alone(query: Query, sample: MatchSample) -> list[str]:
+    """How many frames match by the tolerance alone."""
+    if not sample.frames:
+        return []
+    from scenicq.query.explain.tolerance_share import by_tolerance_alone  # noqa: PLC0415 - takes long to load
+
+    share = by_tolerance_alone(query, sample.frames, _BUDGET_S)
+    told = [
+        f"{number:,} by that of {what}"
+        for what, number in (("positions", share.positions), ("headings", share.headings))
+        if number
+    ]
+    looked = f"{share.frames:,} of {sample.of:,} matches" if share.frames < sample.of else count(sample.of, "match")
+    return [f"    of {looked} by a tolerance alone: {', '.join(told)}"] if told else []
+
+
+def show_funnel(query: Query, elapsed_s: float, told: Collection[Diagnostic], sample: MatchSample) -> None:
     """Print the summary on standard error.
 
     Args:
         query: After its results were taken.
         elapsed_s: Seconds that it took.
         told: Warnings that were shown before the results.
+        sample: Some of the frames that match.
     """
     show(each for each in query.funnel.warnings if each not in told)
     lines = columns(_steps(query), right=frozenset({0}))
-    lines += [*_failures(query.funnel), *_broken(query.funnel)]
+    lines += [*_failures(query.funnel), *_defaults(query), *_broken(query.funnel)]
     for what, frames in sorted(query.funnel.missing.items()):
         lines.append(f"  `{what}` is missing in {count(frames, 'frame')} of the dataset, and not compared there")
     for what, number in sorted(query.funnel.unrecorded.items()):
@@ -93,5 +166,6 @@ def show_funnel(query: Query, elapsed_s: float, told: Collection[Diagnostic]) ->
     if waived:
         lines.append(f"  waived: {', '.join(waived)} (see --enforce)")
     lines.append(f"  tolerance: {query.options.match.tolerance} (see --tolerance)")
+    lines += _alone(query, sample)
     lines.append(f"  {count(query.funnel.frames, 'frame')} in {elapsed_s:.1f} s")
     click.echo("\n".join(lines), err=True)

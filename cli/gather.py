@@ -12,6 +12,8 @@ from scenicq.query.execution.pieces import gather as find_pieces
 from scenicq.query.execution.question_notes import noted_question
 from scenicq.query.execution.recorded_columns import columns_of_records
 from scenicq.query.execution.records import FrameRecord, IntervalRecord, read_record
+from scenicq.query.execution.result_selection import ResultSelection, read_sort, read_where
+from scenicq.query.execution.result_summary import ResultCount
 from scenicq.query.execution.result_tables import roles_of
 from scenicq.store.remote_path import AnyPath
 
@@ -20,6 +22,7 @@ from .formats import FORMATS, make_writer
 from .manual import OPEN, Manual
 from .output import ProgressBar, choose_format, destination, writing
 from .path_type import ANY_PATH, chosen_file
+from .selections import SORT, WHERE, tell_unclear
 from .sources import SENSORS
 
 __all__ = ["gather"]
@@ -39,13 +42,15 @@ __all__ = ["gather"]
               help="Hand the matching frames on, too, in a new folder DIR; as for `match`.")  # fmt: skip
 @click.option("--report", metavar="DIR", type=ANY_PATH,
               help="Write a page with pictures of the matches, too: DIR/index.html.")  # fmt: skip
+@WHERE
+@SORT
 @SENSORS
 @click.option("--exit-zero", is_flag=True, help="Exit with 0 also where nothing matches, or something is undecided.")
 @click.pass_context
 def gather(ctx: click.Context, folder: AnyPath, *, format_: str | None, output: AnyPath | None,
            export: tuple[str, AnyPath] | None, report: AnyPath | None, sensors: Path | None,
-           exit_zero: bool) -> None:  # fmt: skip
-    """Put the shards of a query together, in the order of the dataset.
+           where: str | None, sort: str | None, exit_zero: bool) -> None:  # fmt: skip
+    """Put the shards of a query together, in the order of the dataset or by what the program records.
 
     A shard that is missing or damaged is named. For an export or a report, dataset and scenario are read where they
     were when the shards were run. Exit codes as of `match`.
@@ -53,18 +58,32 @@ def gather(ctx: click.Context, folder: AnyPath, *, format_: str | None, output: 
     file = chosen_file(output)
     form = choose_format(format_, file)
     gathered = find_pieces(folder)
+    selection = _selection(gathered, where, sort)
     if export is None and report is None:
-        _write(gathered, file, form)
+        _write(gathered, file, form, selection)
     else:
         query = noted_question(folder, gathered.question)
         query.funnel = gathered.funnel
         results = (read_record(each, query.source) for each in gathered.records())
+        if selection is not None:
+            results = selection.applied(results, query.funnel, lambda found: found)
         deliver(query, results, (), Wanted(file, form, export, report, sensors=sensors), ProgressBar(quiet=True))
+    if selection is not None and selection.unclear:
+        tell_unclear(selection)
     if not exit_zero:
         ctx.exit(exit_code(gathered.funnel, gathered.summary))
 
 
-def _write(gathered: Gathered, file: AnyPath | None, form: str) -> None:
+def _selection(gathered: Gathered, where: str | None, sort: str | None) -> ResultSelection | None:
+    if where is None and sort is None:
+        return None
+    columns = columns_of_records(gathered.records())
+    return ResultSelection(
+        None if where is None else read_where(where, columns), None if sort is None else read_sort(sort, columns)
+    )
+
+
+def _write(gathered: Gathered, file: AnyPath | None, form: str, selection: ResultSelection | None) -> None:
     with destination(file) as sink, writing(file):
         first = next(gathered.records(), None)
         origin, over_time = (first and first.dataset) or "", isinstance(first, IntervalRecord)
@@ -72,6 +91,13 @@ def _write(gathered: Gathered, file: AnyPath | None, form: str) -> None:
         writer = make_writer(form, sink, lambda: roles_of(gathered.records()),
                              recorded=lambda: columns_of_records(gathered.records()), origin=origin,
                              over_time=over_time, every=every)  # fmt: skip
-        for each in gathered.records():
+        records, summary = gathered.records(), gathered.summary
+        if selection is not None:
+            records = selection.ordered(selection.filtered(records))
+        counted = ResultCount()
+        for each in counted.counted(records):
             writer.write(each)
-        writer.finish(gathered.summary)
+        if selection is not None:
+            gathered.funnel.chosen = selection.chosen()
+            summary = None if summary is None else selection.summary_of(summary, counted.results)
+        writer.finish(summary)

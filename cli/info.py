@@ -15,6 +15,7 @@ from scenicq.store.manifest import Counts, Manifest
 from scenicq.store.map_fit import MapFit, map_fits, misfits
 from scenicq.store.motion import LONGEST_GAP_US
 from scenicq.store.observed_motion import ObservedMotion, observed_motion
+from scenicq.store.said_values import SaidValues, said_attributes, said_params
 from scenicq.store.schema import SCHEMAS
 from scenicq.store.soundness import check_dataset
 from scenicq.store.verification import verify_computed
@@ -29,7 +30,9 @@ __all__ = ["info"]
 
 _VERIFIED = ("every checksum is right, and every value is sound",)
 _TOP = 10
-"""Recordings and classes of the source that are listed."""
+"""Recordings, classes of the source and names of what labels say that are listed."""
+_FEW, _WIDEST = 5, 24
+"""Values of one name that are listed, and how many characters of each."""
 
 
 def _counted(title: str, counts: Mapping[str, Counts]) -> list[str]:
@@ -37,6 +40,28 @@ def _counted(title: str, counts: Mapping[str, Counts]) -> list[str]:
     rows = [(name, f"{each.frames:,}", f"{each.objects:,}") for name, each in ranked[:_TOP]]
     more = [f"  and {len(ranked) - _TOP:,} more"] if len(ranked) > _TOP else []
     return [*columns([(title, "frames", "objects"), *rows], right=frozenset({1, 2}), indent=""), *more, ""]
+
+
+def _said(title: str, what: str, said: Mapping[str, SaidValues]) -> list[str]:
+    """What labels say beside the columns, by name."""
+    if not said:
+        return []
+    rows = [(name, f"{each.count:,}", _values(each)) for name, each in [*said.items()][:_TOP]]
+    more = [f"  and {len(said) - _TOP:,} more"] if len(said) > _TOP else []
+    return [*columns([(title, what, "values"), *rows], right=frozenset({1}), indent=""), *more, ""]
+
+
+def _values(said: SaidValues) -> str:
+    """The values of one name, the most frequent first."""
+    told = [] if said.numbers is None else [" to ".join(dict.fromkeys(f"{each:.6g}" for each in said.numbers))]
+    shown = [f"{_short(text)} {number:,}" for text, number in [*said.others.items()][:_FEW]]
+    more = [f"{len(said.others) - _FEW:,} more"] if len(said.others) > _FEW else []
+    return ", ".join([*told, *shown, *more])
+
+
+def _short(text: str) -> str:
+    told = plain(text).replace("\n", " ")
+    return told if len(told) <= _WIDEST else f"{told[: _WIDEST - 3]}..."
 
 
 def _classes(dataset: Dataset) -> list[str]:
@@ -161,6 +186,8 @@ def _lines(dataset: Dataset, fits: Sequence[MapFit], *, named: bool) -> list[str
         "",
         *_questions(dataset, observed),
         *_classes(dataset),
+        *_said("ATTRIBUTE", "objects", said_attributes(dataset)),
+        *_said("PARAMETER", "frames", said_params(dataset)),
         *_counted("MAP", manifest.by_map),
         *([f"no map for: {', '.join(without_map)}", ""] if without_map else []),
         *_fit(fits, len(dataset.maps)),

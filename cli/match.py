@@ -20,7 +20,6 @@ from scenicq.exporters.forms import FORMS
 from scenicq.match.verdict import Match, Unknown
 from scenicq.option_values import Amount, Count
 from scenicq.query.execution.executors import Executor, in_order, on_this_machine, resumed, usual_pieces
-from scenicq.query.execution.result_selection import ResultSelection, read_sort, read_where
 from scenicq.query.execution.result_summary import ResultSummary
 from scenicq.query.execution.results import Result, Sample
 from scenicq.query.execution.run import Query
@@ -34,7 +33,7 @@ from .datasets import open_checked
 from .deliver import Wanted, deliver, exit_code
 from .engine import parse_engine
 from .formats import FORMATS, SPREADSHEET_HELP
-from .funnel import show_funnel
+from .funnel import MatchSample, show_funnel
 from .main import INTERRUPTS, UNDECIDED
 from .manual import OPEN, Manual
 from .option_type import OptionType
@@ -45,7 +44,8 @@ from .pieces import LateShardError, Shard, parse_shard, run_shard
 from .plan import show_plan
 from .programs import LANES, MAP_DEFAULTS, PARAMS, PROGRAM_TEXT, RUN_SCENARIO, SCENARIO, given_program
 from .remarks import remarks, show_remarks
-from .report import count, show
+from .report import show
+from .selections import SORT, WHERE, tell_unclear
 from .sources import SENSORS
 
 __all__ = ["match"]
@@ -121,11 +121,8 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @click.option("--near", metavar="K", type=OptionType(Count()), help="Show the K frames, too, that do not match but "
               "come closest, each with the tolerance under which it would; over time K recordings, each with the "
               "tolerance, the number of the program or the duration with which it would.")
-@click.option("--where", metavar="CONDITION", help="Show only matches that meet a condition on what the program "
-              "records (`record (distance to lead) as gap`): 'gap < 5', over time 'gap.minimum < 5'; also `and`, `or`, "
-              "`not`. Where a value is null it is not known: such matches are left out, and counted.")
-@click.option("--sort", metavar="NAME[:desc]", help="Order matches by a value that the program records, the least "
-              "first, those without one last; with --limit no more than so many are kept in memory.")
+@WHERE
+@SORT
 @click.option("--rank", is_flag=True, help="Order matches from typical to borderline: by the density with which the "
               "program generates what the label observes.")
 @click.option("--sample", metavar="N", type=OptionType(Count()), help="Show N of the matches, drawn at random.")
@@ -176,7 +173,7 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 def match(ctx: click.Context, scenario: str | None, dataset: str | None, *, program: str | None, format_: str | None,
           output: AnyPath | None, export: tuple[str, AnyPath] | None, near: int | None, deadline: float | None,
           report: AnyPath | None, shard: Shard | None, resume: bool, sensors: Path | None, engine: Executor | None,
-          explain: bool, advised: bool, where: str | None, sort: str | None, rank: bool, sample: int | None,
+          explain: bool, advised: bool, rank: bool, sample: int | None,
           diverse: bool, exit_zero: bool, summary: bool, quiet: bool, **given: Any) -> None:
     # fmt: on
     """Find the frames or intervals of a dataset that match a scenario.
@@ -193,22 +190,19 @@ def match(ctx: click.Context, scenario: str | None, dataset: str | None, *, prog
     check_combination(ctx, together)
     source, (target,), model = given_program(ctx, program, (scenario, dataset), 1)
     options = query_options({**given, "model": model})
-    limit, by_recorded = options.limit, where is not None or sort is not None
-    if by_recorded:
-        # of the matches that are shown
-        options = replace(options, limit=None)
+    by_recorded = options.where is not None or options.sort is not None
     reads = report or export or rank or sample or shard or engine or resume or options.all_matches or by_recorded
     if chosen == "ids" and not reads:
         options = replace(options, proofs=False)
-    told = summary or (sys.stderr.isatty() and not quiet)
-    if not (told or explain or report or near or shard or engine or resume):
+    summarized = summary or (sys.stderr.isatty() and not quiet)
+    if not (summarized or explain or report or near or shard or engine or resume):
         # of frames, advice reads it, too
         options = replace(options, interval_reasons=False, reasons=advised or not quiet)
     if deadline is not None:
         options = replace(options, until=time.monotonic() + deadline)
     query = Query(open_checked(str(target)), source, options)
     check_over_time(ctx, together, query.is_over_time)
-    selection = _selection(query, where, sort, limit) if by_recorded else None
+    selection = query.selection()
     if explain:
         show_plan(query)
         return
@@ -223,8 +217,7 @@ def match(ctx: click.Context, scenario: str | None, dataset: str | None, *, prog
             show(error.diagnostics)
             ctx.exit(0 if exit_zero else UNDECIDED)
         query.funnel = replace(funnel, warnings=query.funnel.warnings)
-        _conclude(ctx, query, told, said, time.perf_counter() - started, summary=summary, quiet=quiet,
-                  exit_zero=exit_zero)  # fmt: skip
+        _conclude(ctx, query, told, said, time.perf_counter() - started, summarized=summarized, exit_zero=exit_zero)
         return
     pieces = None
     again = "the same command goes on from here" if resume else "`--resume` keeps what is done until it stops"
@@ -236,12 +229,14 @@ def match(ctx: click.Context, scenario: str | None, dataset: str | None, *, prog
     bar = ProgressBar(query.dataset.manifest.total.frames, quiet=quiet)
     results = in_order(query, engine, usual_pieces(query, 16), bar.advance) if engine else query.results(bar.advance)
     wanted = Wanted(file, chosen, export, report, pieces, sensors, ranked=rank)
-    if selection is not None:
-        results = _filtered(query, results, selection)
-    if rank or sample is not None:
-        results = _selected(query, results, sample, rank=rank, diverse=diverse)
-    if selection is not None:
-        results = _ordered(query, results, selection)
+
+    def drawn(found: Generator[Result]) -> Generator[Result]:
+        return _selected(query, found, sample, rank=rank, diverse=diverse) if rank or sample is not None else found
+
+    results = drawn(results) if selection is None else selection.applied(results, query.funnel, drawn)
+    matching = MatchSample()
+    if summarized and not query.is_over_time():
+        results = matching.gathered(results)
     came_close: list[str] = []
     with contextlib.nullcontext() if pieces is None else sole_writer(pieces):
         try:
@@ -259,7 +254,7 @@ def match(ctx: click.Context, scenario: str | None, dataset: str | None, *, prog
     elif near is not None and not came_close:
         _tell_far(query)
     if selection is not None and selection.unclear:
-        _tell_unclear(selection)
+        tell_unclear(selection)
     cut = [each for each in query.funnel.warnings if each.code in ("ranking-cut", "no-density")]
     show(cut)
     whole = not said.skipped and not query.funnel.over_time
@@ -267,7 +262,7 @@ def match(ctx: click.Context, scenario: str | None, dataset: str | None, *, prog
         advise(query, asked=advised, near=near is not None)
     told = [*told, *cut]
     elapsed_s = time.perf_counter() - started
-    _conclude(ctx, query, told, said, elapsed_s, summary=summary, quiet=quiet, exit_zero=exit_zero)
+    _conclude(ctx, query, told, said, elapsed_s, matching, summarized=summarized, exit_zero=exit_zero)
 
 
 def _noted(found: Iterable[Result], recordings: list[str]) -> Iterator[Result]:
@@ -291,35 +286,6 @@ def _tell_cut(query: Query, *, resume: bool) -> None:
     message = f"the deadline passed: {done:,} of {total:,} frames are decided, and the others are not in the results"
     again = "the same command goes on from here" if resume else "`--resume` with `-o FILE` keeps what is done"
     show([Diagnostic("deadline-passed", message, hints=(again,), severity="warning")])
-
-
-def _tell_unclear(selection: ResultSelection) -> None:
-    """Say for how many matches the condition of `--where` is not known."""
-    what = f"of {count(selection.unclear, 'match')} it is not known whether --where holds"
-    message = f"{what}, as what is recorded is null: left out"
-    hints = ("`unrecorded` of results says why",)
-    show([Diagnostic("results-incomplete", message, hints=hints, severity="warning")])
-
-
-def _selection(query: Query, where: str | None, sort: str | None, limit: int | None) -> ResultSelection:
-    columns = query.recorded_columns()
-    return ResultSelection(
-        None if where is None else read_where(where, columns), None if sort is None else read_sort(sort, columns), limit
-    )
-
-
-def _filtered(query: Query, results: Generator[Result], selection: ResultSelection) -> Generator[Result]:
-    """Pass on the matches that meet `--where`, up to the limit."""
-    with contextlib.closing(results):
-        yield from selection.filtered(results)
-    query.funnel.limited = selection.last
-
-
-def _ordered(query: Query, results: Generator[Result], selection: ResultSelection) -> Generator[Result]:
-    """Sort the results by `--sort`, once all are there."""
-    with contextlib.closing(results):
-        yield from selection.ordered(results)
-    query.funnel.chosen = selection.chosen()
 
 
 def _selected(
@@ -355,13 +321,13 @@ def _conclude(
     told: Collection[Diagnostic],
     said: ResultSummary | None,
     elapsed_s: float,
+    matching: MatchSample | None = None,
     *,
-    summary: bool,
-    quiet: bool,
+    summarized: bool,
     exit_zero: bool,
 ) -> None:
     """Print the summary and choose the exit code."""
-    if summary or (sys.stderr.isatty() and not quiet):
-        show_funnel(query, elapsed_s, told)
+    if summarized:
+        show_funnel(query, elapsed_s, told, matching or MatchSample())
     if not exit_zero:
         ctx.exit(exit_code(query.funnel, said))

@@ -31,7 +31,7 @@ TOPICS = {
     "Over time": {"behaviors", "reaction", "min_duration", "intervals", "gap"},
     "How it is decided": {"solver", "method", "timeout", "budget", "prefilter", "jobs", "engine"},
     "What comes out": {
-        "limit", "every", "all_matches", "near", "rank", "sample", "diverse", "advised",
+        "limit", "every", "all_matches", "near", "where", "sort", "rank", "sample", "diverse", "advised",
         "format_", "output", "report", "sensors", "export", "explain",
     },
     "Long runs": {"shard", "resume"},

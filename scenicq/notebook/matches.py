@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,6 +26,7 @@ from scenicq.notebook.judgements import Judgement
 from scenicq.notebook.pictures import SCROLLS, DisplayedText, Picture, take_picture
 from scenicq.query.execution.interval_frames import verdict_at
 from scenicq.query.execution.lazy_solver import LazySolver
+from scenicq.query.execution.option_texts import read_options
 from scenicq.query.execution.recorded_columns import flat_table
 from scenicq.query.execution.records import json_text, record
 from scenicq.query.execution.result_origin import name_origin
@@ -173,6 +174,7 @@ class Matches(Sequence[FrameResult]):
     def __post_init__(self) -> None:
         """Compile the program, so that its errors come now."""
         self.query.plans()
+        self.query.selection()
         self.origin = name_origin(self.query.dataset)
 
     @classmethod
@@ -214,7 +216,10 @@ class Matches(Sequence[FrameResult]):
     def _take(self) -> bool:
         """Find one more result."""
         if self._rest is None:
-            self._rest = self.query.results()
+            results, selection = self.query.results(), self.query.selection()
+            if selection is not None:
+                results = selection.applied(results, self.query.funnel, lambda found: found)
+            self._rest = results
         for result in self._rest:
             self._found.append(FrameResult.of(self, result))
             return True
@@ -232,6 +237,28 @@ class Matches(Sequence[FrameResult]):
     def __getitem__(self, which: Any) -> Any:
         """A result by its number, several by a slice."""
         return self._all()[which]
+
+    def select(self, *, where: str | None = None, sort: str | None = None) -> Matches:
+        """Some of the matches, or all in another order, by what the program records; nothing is matched again.
+
+        Args:
+            where: A condition on what is recorded, such as `"gap < 5"`; over time `"gap.minimum < 5"`.
+            sort: What to order by, such as `"gap"`, or `"gap:desc"` from the greatest.
+
+        Raises:
+            DataError: option-invalid: there is no such value.
+        """
+        before, results = self.query, [each.result for each in self._all()]
+        asked = read_options(where=where, sort=sort)
+        options = replace(before.options, where=asked.where, sort=asked.sort, limit=None)
+        query = Query(
+            before.dataset, before.source, options, before.recordings, replace(before.funnel), before.siblings
+        )
+        selection = query.selection()
+        if selection is not None:
+            results = list(selection.ordered(selection.filtered(results)))
+            query.funnel.chosen = selection.chosen().after(before.funnel.chosen)
+        return Matches.restored(query, self.origin, results)
 
     @property
     def funnel(self) -> Funnel:

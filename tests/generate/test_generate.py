@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
 
@@ -31,6 +32,16 @@ NO_SCENE = {
 }
 NO_SCENES = ("dynamic:", "cookbook-over-time:", "warnings:")
 """Pages of programs about what happens over time, and of programs that cannot be meant."""
+OVER_TIME = re.compile(
+    r"^\s*(require (not )?\(?(always|eventually|next)\b|terminate when|terminate after)", re.MULTILINE
+)
+OTHERS = re.compile(r"^from scenicq\.labels import .*\b(others|count|nearest)\b", re.MULTILINE)
+"""What asks of all objects matches no more among others that play no role; `tests/oracle/test_others.py` judges it."""
+EXAMINED = [
+    name for name, each in examples().items()
+    if not name.startswith(NO_SCENES) and not OTHERS.search(each.text)
+    and (each.initial or not OVER_TIME.search(each.text))
+]  # fmt: skip
 
 
 def check(example: Example, count: int) -> None:
@@ -52,6 +63,6 @@ def test_some_scenes_match_and_do_not_once_they_are_pushed_out(name: str) -> Non
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [name for name in examples() if not name.startswith(NO_SCENES)])
+@pytest.mark.parametrize("name", EXAMINED)
 def test_scenes_of_every_program_match_and_do_not_once_they_are_pushed_out(name: str) -> None:
-    check(examples()[name], 4)
+    check(examples()[name], 2)

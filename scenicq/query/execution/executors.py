@@ -185,7 +185,7 @@ def in_order(query: Query, executor: Executor, pieces: Iterable[DatasetPiece], p
         pieces: All of them.
         progress: Called with the number of frames decided since the last call.
     """
-    return up_to(query.options.limit, _put_together(query, executor, pieces, progress), query.funnel)
+    return up_to(query.limit, _put_together(query, executor, pieces, progress), query.funnel)
 
 
 def _put_together(

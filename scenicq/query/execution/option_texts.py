@@ -58,6 +58,8 @@ class OptionTexts(TypedDict, total=False):
     timeout: float | str
     budget: int | str
     limit: int | str | None
+    where: str | None
+    sort: str | None
     every: bool
     all_matches: bool
     strict: bool
@@ -92,6 +94,8 @@ KINDS: Mapping[str, OptionKind] = {
     "timeout": Amount("s", above=True),
     "budget": Count(),
     "limit": Count(),
+    "where": Text("a condition on what the program records"),
+    "sort": Text("the name of what the program records, with `:desc` from the greatest"),
     "every": Flag(),
     "all_matches": Flag(),
     "strict": Flag(),
@@ -111,8 +115,8 @@ KINDS: Mapping[str, OptionKind] = {
 }
 """What values the options have, by the names of the command line, for the command and for Python."""
 _OPTIONAL = frozenset({
-    "tolerance", "radius", "enforce", "jobs", "limit", "scenic", "ignore_params", "min_duration", "model",
-    "run_scenario", "params",
+    "tolerance", "radius", "enforce", "jobs", "limit", "where", "sort", "scenic", "ignore_params", "min_duration",
+    "model", "run_scenario", "params",
 })  # fmt: skip
 
 
@@ -182,8 +186,8 @@ def read_options(**given: Unpack[OptionTexts]) -> QueryOptions:
     )
     time = IntervalOptions(read.get("intervals", "longest"), read.get("min_duration"), read.get("gap", DEFAULT_GAP_S))
     same = (
-        "solver", "initial", "map_defaults", "lanes", "prefilter", "jobs", "limit", "every", "all_matches", "strict",
-        "model", "run_scenario",
+        "solver", "initial", "map_defaults", "lanes", "prefilter", "jobs", "limit", "where", "sort", "every",
+        "all_matches", "strict", "model", "run_scenario",
     )  # fmt: skip
     values: dict[str, Any] = {name: value for name, value in read.items() if name in same}
     version = None if scenic is None else VERSIONS[scenic]

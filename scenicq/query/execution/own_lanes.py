@@ -5,15 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import groupby
 
 import numpy as np
 
-from scenicq.forest.nodes import Constant, DirectionAt, Feature
+from scenicq.compiler.element_lookups import LOOKUPS, LookupTable
+from scenicq.forest.nodes import AheadInLanes, Constant, DirectionAt, Feature, Node
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.simplify import roots_of
 from scenicq.forest.walk import postorder
+from scenicq.geometry.network import Network
 from scenicq.geometry.occupancy import ElementAtPoint, Occupancy
 from scenicq.match.verdict import Match
 from scenicq.query.execution.members import Members
@@ -39,6 +41,23 @@ class _Asked:
     along: bool
 
 
+def _asked_by(node: Node) -> _Asked | None:
+    """How a node asks for the lanes at a place, if it does."""
+    match node:
+        case DirectionAt(field=Constant(value=ElementAtPoint() as ranked)) if ranked.options.is_of_lanes:
+            return _Asked(ranked.options, ranked.by_heading)
+        case AheadInLanes():
+            return _Asked(_lanes_of(node.network), not isinstance(node.heading, Constant))
+        case _:
+            return None
+
+
+@lru_cache(maxsize=16)
+def _lanes_of(network: Network) -> Occupancy:
+    family, layers = LOOKUPS["laneAt"]
+    return LookupTable("network.laneAt", family, layers(network)).occupancy
+
+
 @dataclass(eq=False)
 class OwnLanes:
     """Names the lanes of roles.
@@ -54,12 +73,11 @@ class OwnLanes:
         """The roles whose lanes are asked for, by name, in the order of the program."""
         found: dict[int, _Asked] = {}
         for node in postorder(roots_of(self.scenario)):
-            if isinstance(node, DirectionAt) and isinstance(node.field, Constant) and isinstance(node.point, Feature):
-                ranked, index = node.field.value, node.point.object
-                if isinstance(ranked, ElementAtPoint) and ranked.options.is_of_lanes:
-                    before = found.get(index)
-                    along = ranked.by_heading or (before is not None and before.along)
-                    found[index] = _Asked(ranked.options, along)
+            asked = _asked_by(node)
+            if asked is not None and isinstance(node, DirectionAt | AheadInLanes) and isinstance(node.point, Feature):
+                before = found.get(node.point.object)
+                along = asked.along or (before is not None and before.along)
+                found[node.point.object] = _Asked(asked.lanes, along)
         return {owner.name: found[owner.index] for owner in self.scenario.objects if owner.index in found}
 
     def of_label(self, label: Label, correspondence: Mapping[str, str]) -> dict[str, Standing]:

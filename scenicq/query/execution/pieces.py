@@ -86,7 +86,10 @@ def fingerprint(dataset: Dataset, program: str, options: QueryOptions) -> str:
     asked = asdict(options)
     asked["match"]["enforce"] = sorted(asked["match"]["enforce"])
     asked["match"]["ignore_params"] = sorted(asked["match"]["ignore_params"])
-    for name in ("jobs", "prefilter", "strict", "until"):
+    if options.where is not None or options.sort is not None:
+        # of the matches that are shown, which is seen to afterwards
+        asked["limit"] = None
+    for name in ("jobs", "prefilter", "strict", "until", "where", "sort"):
         asked.pop(name)
     if "record" in program:
         # versions before have left out what is recorded

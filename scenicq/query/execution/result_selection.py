@@ -7,17 +7,21 @@ match of which it is unknown is left out, and counted. What is no match is no ma
 
 from __future__ import annotations
 
+import contextlib
 import heapq
 import operator
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, cast
+from typing import Any, TypeVar, cast
+
+from msgspec import UNSET, structs
 
 from scenicq.errors import DataError, Diagnostic, ScenarioError, Source, Span, similar
 from scenicq.match.verdict import Match
 from scenicq.query.execution.recorded_columns import ColumnKind, RecordedColumn
-from scenicq.query.execution.records import SeriesRecord, recorded_fields
-from scenicq.query.execution.results import Chosen, RecordedCell, Result
+from scenicq.query.execution.records import Record, SeriesRecord, recorded_fields
+from scenicq.query.execution.result_summary import ResultSummary
+from scenicq.query.execution.results import Chosen, Funnel, RecordedCell, Result
 from scenicq.syntax import ast
 from scenicq.syntax.parser import parse
 
@@ -29,6 +33,8 @@ _COMPARE: dict[str, Callable[[Any, Any], bool]] = {
 _NUMBERS = ("minimum", "maximum", "mean")
 _PARTS = ("first", "last", *_NUMBERS)
 
+_Shown = TypeVar("_Shown", Result, Record)
+"""A result, or one as it is written."""
 Cells = Mapping[str, RecordedCell]
 """Values by their names, the parts of what is recorded over an interval as `gap.minimum`."""
 _Read = Callable[[Cells], RecordedCell]
@@ -89,17 +95,56 @@ class ResultSelection:
     others: int = 0
     unclear: int = 0
     beyond: int = 0
-    last: Result | None = field(default=None)
+    last: Result | Record | None = field(default=None)
 
     def chosen(self) -> Chosen:
         """What was chosen, once the results are taken."""
         where, sort = ("" if each is None else each.text for each in (self.where, self.sort))
         return Chosen(where, sort, self.shown, self.others, self.unclear, self.beyond, self.limit)
 
-    def filtered(self, results: Iterable[Result]) -> Iterator[Result]:
+    def summary_of(self, whole: ResultSummary, results: int) -> ResultSummary:
+        """What the results that are shown say of themselves.
+
+        Args:
+            whole: What all of them say.
+            results: How many are there.
+        """
+        chosen = self.chosen()
+        return structs.replace(
+            whole,
+            complete=whole.complete and not chosen.left_out,
+            results=results,
+            where=chosen.where or UNSET,
+            sort=chosen.sort or UNSET,
+            left_out=whole.left_out + chosen.left_out,
+            variables=whole.variables if results else {},
+        )
+
+    def applied(
+        self, results: Generator[Result], funnel: Funnel, between: Callable[[Generator[Result]], Generator[Result]]
+    ) -> Generator[Result]:
+        """The results of a query that are shown, in their order; then the funnel says which they are.
+
+        Args:
+            results: All results of the query.
+            funnel: What counts them.
+            between: What becomes of those that meet the condition before they are ordered.
+        """
+
+        def filtered() -> Generator[Result]:
+            with contextlib.closing(results):
+                yield from self.filtered(results)
+            funnel.limited = cast("Result | None", self.last)
+
+        left = between(filtered())
+        with contextlib.closing(left):
+            yield from self.ordered(left)
+        funnel.chosen = self.chosen()
+
+    def filtered(self, results: Iterable[_Shown]) -> Iterator[_Shown]:
         """The results that meet the condition; without an order, up to the limit."""
         for each in results:
-            if not isinstance(each.verdict, Match):
+            if not _matches(each):
                 yield each
                 continue
             truth = True if self.where is None else self.where.truth(cells_of(each))
@@ -114,17 +159,17 @@ class ResultSelection:
                     self.last = each
                     return
 
-    def ordered(self, results: Iterable[Result]) -> Iterator[Result]:
+    def ordered(self, results: Iterable[_Shown]) -> Iterator[_Shown]:
         """The results in order, once all are there; with a limit, no more than so many matches are in memory."""
         if self.sort is None:
             yield from results
             return
-        key, rest, matches = self.sort, list[Result](), 0
+        key, rest, matches = self.sort, list[_Shown](), 0
 
-        def matching() -> Iterator[tuple[tuple[bool, float], int, Result]]:
+        def matching() -> Iterator[tuple[tuple[bool, float], int, _Shown]]:
             nonlocal matches
             for each in results:
-                if isinstance(each.verdict, Match):
+                if _matches(each):
                     # equal ones stay in their order
                     yield key.of(cells_of(each)), matches, each
                     matches += 1
@@ -140,10 +185,18 @@ class ResultSelection:
         yield from rest
 
 
-def cells_of(result: Result) -> Cells:
+def _matches(result: Result | Record) -> bool:
+    return isinstance(result.verdict, Match) or result.verdict == "match"
+
+
+def cells_of(result: Result | Record) -> Cells:
     """What a result carries, by names; over an interval by those of its parts."""
     found: dict[str, RecordedCell] = {}
-    for name, value in recorded_fields(result.recorded or {}, series=result.interval is not None).items():
+    if isinstance(result, Result):
+        told = recorded_fields(result.recorded or {}, series=result.interval is not None)
+    else:
+        told = result.recorded or {}
+    for name, value in told.items():
         if isinstance(value, SeriesRecord):
             found.update({f"{name}.{part}": getattr(value, part) for part in _PARTS})
         else:

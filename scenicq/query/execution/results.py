@@ -161,6 +161,16 @@ class Chosen:
     beyond: int
     limit: int | None = None
 
+    def after(self, before: Chosen | None) -> Chosen:
+        """What both have chosen, one out of what the other has left."""
+        if before is None:
+            return self
+        where = f"({before.where}) and ({self.where})" if before.where and self.where else before.where or self.where
+        return Chosen(
+            where, self.sort or before.sort, self.shown, before.others + self.others, before.unclear + self.unclear,
+            before.beyond + self.beyond, before.limit,
+        )  # fmt: skip
+
     @property
     def left_out(self) -> int:
         """How many are left out."""

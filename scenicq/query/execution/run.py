@@ -36,6 +36,7 @@ from scenicq.query.execution.merged_blocks import merge_frames, merge_intervals,
 from scenicq.query.execution.never_compared import Coverage, coverage
 from scenicq.query.execution.program_files import SiblingFiles
 from scenicq.query.execution.recorded_columns import RecordedColumn, columns_of
+from scenicq.query.execution.result_selection import ResultSelection, read_sort, read_where
 from scenicq.query.execution.results import Funnel, Result, up_to
 from scenicq.query.prefilter.executor import Block, Extent, blocks, extents, names, whole_recordings
 from scenicq.query.prefilter.plan import Plan
@@ -66,6 +67,7 @@ class QueryOptions:
         prefilter: Whether SQL narrows the frames first; the results are the same.
         jobs: Processes that match; None for as many as pays.
         limit: Matches after which to stop; None for all.
+        where, sort: Which of the matches are shown and in what order, by what the program records (`selected`).
         every: Whether frames that do not match are results too.
         all_matches: Whether every correspondence of a frame is a result of its own.
         behaviors: What becomes of the behaviors of a program over time.
@@ -92,6 +94,8 @@ class QueryOptions:
     prefilter: bool = True
     jobs: int | None = 1
     limit: int | None = None
+    where: str | None = None
+    sort: str | None = None
     every: bool = False
     all_matches: bool = False
     behaviors: Behaviors = "motion"
@@ -384,6 +388,28 @@ class Query:
         compiled = next(self.fitting(), None)
         return compiled is not None and self.over_time(compiled.scenario)
 
+    @property
+    def limit(self) -> int | None:
+        """Matches after which to stop; None for all, as where it is chosen among all that match."""
+        chosen = self.options.where is not None or self.options.sort is not None
+        return None if chosen else self.options.limit
+
+    def selection(self) -> ResultSelection | None:
+        """Which matches are shown and in what order, by what the program records; None where all are, as they come.
+
+        Raises:
+            DataError: option-invalid: there is no such value.
+        """
+        where, sort = self.options.where, self.options.sort
+        if where is None and sort is None:
+            return None
+        columns = self.recorded_columns()
+        return ResultSelection(
+            None if where is None else read_where(where, columns),
+            None if sort is None else read_sort(sort, columns),
+            self.options.limit,
+        )
+
     def results(self, progress: Callable[[int], None] | None = None) -> Generator[Result]:
         """Results in the order of recording, time and frame, map by map.
 
@@ -393,7 +419,7 @@ class Query:
         Raises:
             ScenarioError: The program is wrong or not supported.
         """
-        return up_to(self.options.limit, self._all_results(progress), self.funnel)
+        return up_to(self.limit, self._all_results(progress), self.funnel)
 
     def _all_results(self, progress: Callable[[int], None] | None) -> Generator[Result]:
         compiled = self._compiled_maps()

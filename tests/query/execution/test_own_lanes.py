@@ -52,6 +52,18 @@ def test_with_any_lane_all_are_its_own(run, asked):
     assert lanes_of(run("match", *asked, "--format", "jsonl", "--lanes", "any").stdout) == [TOLD[0], both, both]
 
 
+@pytest.mark.parametrize(("rest", "told"), [([], TOLD[1:2]), (["--lanes", "any"], TOLD[1:2])])
+def test_what_lies_ahead_asks_for_lanes(run, asked, rest, told):
+    asked[0].write_text(
+        "model scenic.domains.driving.model\nfrom scenicq.labels import ahead\n"
+        "ego = new Car in everywhere, facing Range(-180, 180) deg\n"
+        "require (0, 5) in ahead(ego, 2)\n"
+    )
+    found = lanes_of(run("match", *asked, "--format", "jsonl", *rest).stdout)
+    assert found[:1] == told
+    assert all(set(each["ego"]["own"]) <= {"in", "u", "cross"} for each in found)
+
+
 def test_a_program_that_asks_for_no_lane_is_told_none(run, asked):
     asked[0].write_text("model scenic.domains.driving.model\nego = new Car at (2, -3)\n")
     assert lanes_of(run("match", *asked, "--format", "jsonl").stdout) == [None]
