@@ -27,6 +27,7 @@ NO_LIMITS = {
     "match/fields/witness_search.py": "_FEW: draws of a search that has nowhere to go",
     "query/execution/result_files.py": "_LONGEST: what a cell of a file may be",
     "query/explain/changes.py": "MOST_M: how far `--near` looks",
+    "query/explain/tolerance_share.py": "_LONGEST_S: the time of a frame that nobody asked for",
     "query/explain/violations.py": "_LONGEST_NAME: a name that is shown",
     "query/prefilter/executor.py": "_FEWEST_FRAMES, _MOST_FRAMES, _MOST_NAMED: sizes of blocks",
     "smt/smtlib.py": "_LONGEST: nesting beyond which a part has a name",

@@ -101,8 +101,6 @@ def _names(value: ModelValue) -> set[str]:
             return set(value.properties) | set(_PART_NAMES)
         case Module():
             return set(value.names)
-        case ScenarioCall():
-            return set(value.names or ())
         case Network() | NetworkElement() | Maneuver() | Signal():
             return names_of(value)
         case _:
@@ -116,9 +114,10 @@ def _lookup(run: Interpreter, value: ModelValue, name: str, span: Span) -> Model
         case Module():
             return None if value.dynamic else value.names.get(name, MISSING)
         case ScenarioCall():
-            if value.names is None:
+            names = run.begun(value)
+            if names is None:
                 raise NotBegun(Diagnostic("runtime-error", f"the scenario has no `{name}` before it begins", span))
-            return value.names.get(name, MISSING)
+            return names.get(name, MISSING)
         case ScenicClass():
             return next((cls.attributes[name] for cls in value.ancestry() if name in cls.attributes), MISSING)
         case Network():

@@ -19,8 +19,14 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, cast
 
 from scenicq.compiler.coerce import read_over_time
-from scenicq.compiler.coroutines import CoroutineCall, NotBegun, ScenarioCall, ScenarioDefinition, as_behavior
-from scenicq.compiler.environment import Environment
+from scenicq.compiler.coroutines import (
+    CoroutineCall,
+    DelayedCall,
+    NotBegun,
+    ScenarioCall,
+    ScenarioDefinition,
+    as_behavior,
+)
 from scenicq.compiler.local_values import Held, LocalValues
 from scenicq.compiler.modular import SetUp, set_up
 from scenicq.compiler.overrides import overridden
@@ -245,27 +251,20 @@ class CompositionGraph(ProcessGraph):
         begun = (self.scenarios[number].made.ego for _, number in state.begun)
         return next((each for each in begun if each is not None), None)
 
-    def scope(self, state: ProcessState, number: int) -> Environment:
-        """The names that a call sees; scenarios that have begun have what they have made."""
-        found = super().scope(state, number)
-        found.names.update({name: self._with_names(value, state) for name, value in found.names.items()})
-        return found
-
-    def _with_names(self, value: ModelValue, state: ProcessState) -> ModelValue:
-        if not isinstance(value, ScenarioCall):
-            return value
-        begun = dict(state.begun)
-        number = begun.get(self.values.hold(value).key)
-        return replace(value, names=None if number is None else self.scenarios[number].names)
-
     def _as_seen(self, state: ProcessState, work: Callable[[], ModelValue]) -> ModelValue:
         """What is worked out with the ego of the scenario that goes on; it makes no objects."""
-        run, before, count = self.run, self.run.current_ego, len(self.run.objects)
-        run.current_ego = self.ego_of(state)
+        run, before, count = self.run, (self.run.current_ego, self.run.begun), len(self.run.objects)
+        begun = dict(state.begun)
+
+        def names(call: ScenarioCall) -> Mapping[str, ModelValue] | None:
+            number = begun.get(self.values.hold(call).key)
+            return None if number is None else self.scenarios[number].names
+
+        run.current_ego, run.begun = self.ego_of(state), names
         try:
             found = work()
         finally:
-            run.current_ego = before
+            run.current_ego, run.begun = before
         if len(run.objects) > count:
             raise fail("unsupported-construct", "an object cannot be made here", run.objects[count].span,
                        "within a compose block", ("make it in a `setup` block",))  # fmt: skip
@@ -346,6 +345,8 @@ class CompositionGraph(ProcessGraph):
             value = first.value
         else:
             value, guards = self.evaluated(state, first)
+        if isinstance(value, DelayedCall):
+            value, guards = self.evaluated(state, value.call)
         after = replace(node, waiting=tuple(others))
         is_named = isinstance(first, Held) or not isinstance(first, ast.Call)
         found = self._entered(state, self.as_done(value, node.span), after, rest, is_named=is_named)

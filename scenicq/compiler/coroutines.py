@@ -15,8 +15,8 @@ from scenicq.errors import ScenarioError, Span
 from scenicq.syntax import ast
 
 __all__ = [
-    "BehaviorDefinition", "CoroutineCall", "CoroutineDefinition", "LibraryCall", "LibraryName", "MonitorDefinition",
-    "as_behavior",
+    "BehaviorDefinition", "CoroutineCall", "CoroutineDefinition", "DelayedCall", "LibraryCall", "LibraryName",
+    "MonitorDefinition", "NotBegun", "ScenarioCall", "ScenarioDefinition", "as_behavior", "beside_blocks",
 ]  # fmt: skip
 
 
@@ -68,6 +68,17 @@ def _is_guard(node: ast.Statement) -> bool:
     return isinstance(node, ast.DynamicStatement) and node.kind in ("precondition", "invariant")
 
 
+def beside_blocks(body: tuple[ast.Statement, ...]) -> list[ast.Statement]:
+    """What stands in a scenario beside its blocks, where it has any: neither a condition nor a text that explains."""
+    if not any(map(_is_block, body)):
+        return []
+    return [each for each in body if not (_is_block(each) or _is_guard(each) or _is_text(each))]
+
+
+def _is_text(node: ast.Statement) -> bool:
+    return isinstance(node, ast.ExpressionStatement) and isinstance(node.value, ast.LiteralValue)
+
+
 class NotBegun(ScenarioError):
     """What a scenario makes is read before it begins."""
 
@@ -89,13 +100,14 @@ class CoroutineCall:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ScenarioCall(CoroutineCall):
-    """A call of a scenario.
+    """A call of a scenario."""
 
-    Attributes:
-        names: What it has made, by name; None before it begins.
-    """
 
-    names: Mapping[str, ModelValue] | None = None
+@dataclass(frozen=True, slots=True, eq=False)
+class DelayedCall:
+    """A call of a scenario that takes what another one makes, which has not begun yet."""
+
+    call: ast.Call
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -14,7 +14,15 @@ from scenicq.compiler.assignment import assign
 from scenicq.compiler.classes import bind_arguments, define_class, refuse_decorators
 from scenicq.compiler.coerce import to_region, to_scalar
 from scenicq.compiler.comparisons import binary, iterate
-from scenicq.compiler.coroutines import CoroutineCall, CoroutineDefinition, ScenarioCall, ScenarioDefinition
+from scenicq.compiler.coroutines import (
+    CoroutineCall,
+    CoroutineDefinition,
+    DelayedCall,
+    NotBegun,
+    ScenarioCall,
+    ScenarioDefinition,
+    beside_blocks,
+)
 from scenicq.compiler.courses import Course
 from scenicq.compiler.deviations import deviation, leaves_the_plane
 from scenicq.compiler.element_lookups import LaneRule, Lookups
@@ -96,6 +104,7 @@ class Interpreter:
         timed: Takes what is said about time; None for a program that is matched at one instant.
         overrides: Whether a scenario overrides what objects have.
         is_initial: Whether what runs is the initial scenario.
+        begun: What a scenario has made, by name; None before it begins.
         simulation: What `simulation()` gives; None before the program has run.
         course: Decides the tests of a condition on the scene while one is evaluated: there, no value of an object is
             known before a label tells it. None while the program itself runs.
@@ -118,6 +127,7 @@ class Interpreter:
     timed: TimedStatements | None = None
     overrides: bool = False
     is_initial: bool = True
+    begun: Callable[[ScenarioCall], Mapping[str, ModelValue] | None] = lambda _: None
     ignored: list[Diagnostic] = field(default_factory=list[Diagnostic])
     current_ego: Instance | None = None
     simulation: ModelValue = None
@@ -304,7 +314,7 @@ class Interpreter:
             case ast.ExpressionStatement():
                 self._value(node.value, scope)
             case ast.Assign():
-                value = evaluate_when_read(self, node.value, scope, lambda: self._value(node.value, scope))
+                value = evaluate_when_read(self, node.value, scope, lambda: self._assigned(node.value, scope))
                 for target in node.targets:
                     assign(self, target, value, scope)
             case ast.AugmentedAssign():
@@ -356,6 +366,9 @@ class Interpreter:
             case ast.DynamicStatement(kind="record" | "record initial" | "record final"):
                 record_statement(self, node, scope)
             case ast.DynamicDefinition(kind="scenario"):
+                if lines := beside_blocks(node.body):
+                    raise fail("parse-error", "a scenario with blocks has nothing else", lines[0].span,
+                               "beside the blocks", ("write it in the `setup` block",))  # fmt: skip
                 made = self.make_function(node.name, node.parameters, node.body, scope, node.span)
                 scope.set(
                     node.name,
@@ -393,6 +406,15 @@ class Interpreter:
         if bare and self.version < 3 and not scope.library:
             return self._make(cast(ScenicClass, value), (), scope, node.span)
         return value
+
+    def _assigned(self, node: ast.Expression, scope: Environment) -> ModelValue:
+        """An expression's value; a call that takes what a scenario has not made yet waits until it is done."""
+        try:
+            return self._value(node, scope)
+        except NotBegun:
+            if not isinstance(node, ast.Call):
+                raise
+            return DelayedCall(node)
 
     def dynamic(self, kind: str, span: Span) -> None:
         """Refuse what does not describe one instant, or note that it is ignored.

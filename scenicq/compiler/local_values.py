@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from typing import cast
 
 from scenicq.compiler.contracts import Contract
-from scenicq.compiler.coroutines import CoroutineCall, LibraryCall, ScenarioCall
+from scenicq.compiler.coroutines import CoroutineCall, DelayedCall, LibraryCall, ScenarioCall
 from scenicq.compiler.unread import NoValue
 from scenicq.compiler.values import Choice, Function, Instance, LabelObjects, ModelValue, OtherList, fail, is_node
 from scenicq.errors import Span
@@ -92,6 +92,8 @@ class LocalValues:
                 return "dict", *((self._key(key), self._key(each)) for key, each in items)
             case Instance() if value.index is None and type(value) is Instance:
                 return "point", id(value.cls), *((key, self._key(each)) for key, each in value.properties.items())
+            case DelayedCall():
+                return "delayed", value.call.span
             case ScenarioCall():
                 given = ((key, self._key(each)) for key, each in value.given.items())
                 return "scenario", id(value.of), value.span, *given

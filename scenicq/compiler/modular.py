@@ -138,8 +138,8 @@ def set_up(run: Interpreter, call: CoroutineCall, ego: Instance | None) -> SetUp
     if changed := [name for name in run.params if run.params[name] is not params.get(name)]:
         raise fail("unsupported-construct", "a parameter cannot be set within a run", run.params[changed[0]][1],
                    "set when the scenario begins", ("set it at the top level",))  # fmt: skip
-    if len(run.records) > len(records):
-        raise fail("unsupported-construct", "`record` within a run is not supported", run.records[-1].span,
+    if added := [each for each in run.records if each not in records]:
+        raise fail("unsupported-construct", "`record` within a run is not supported", added[0].span,
                    "of a scenario that others run", ("write it in the scenario that the program runs",))  # fmt: skip
     return SetUp(scope, run.objects[first:], requirements, excluded, timed, ego)
 

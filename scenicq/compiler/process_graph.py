@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, TypeVar, cast
 from scenicq.compiler.assignment import assign
 from scenicq.compiler.coerce import read_over_time, to_boolean
 from scenicq.compiler.contracts import Contract, action_contract, behavior_contract
-from scenicq.compiler.coroutines import CoroutineCall, LibraryCall, MonitorDefinition, as_behavior
+from scenicq.compiler.coroutines import CoroutineCall, LibraryCall, MonitorDefinition, ScenarioDefinition, as_behavior
 from scenicq.compiler.courses import split, without_courses
 from scenicq.compiler.environment import Environment
 from scenicq.compiler.exclusions import with_exclusions
@@ -772,7 +772,7 @@ class ProcessGraph:
     def begin(self, state: ProcessState, value: ModelValue, rest: ProcessState, span: Span) -> Following:
         """Begin a behavior."""
         match value:
-            case CoroutineCall() if not isinstance(value.of, MonitorDefinition):
+            case CoroutineCall() if not isinstance(value.of, MonitorDefinition | ScenarioDefinition):
                 if sum(isinstance(frame, CallFrame) for frame in state.frames) > LIMITS.call_nesting:
                     raise fail("budget-exceeded", f"calls are nested deeper than {LIMITS.call_nesting}", span,
                                "this call", ("replace the recursion by a loop",))  # fmt: skip

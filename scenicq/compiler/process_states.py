@@ -272,10 +272,8 @@ class Asked:
 
 GraphGuards: TypeAlias = tuple[tuple[Node, Span], ...]
 ScenarioStep: TypeAlias = Begin | CheckSample | Stop | Leave | PutBehavior
-Following: TypeAlias = (
-    "ProcessState | Asked | Ways | OnTimer | TimerStarts | Waits | Terminate | Reject | End | GiveUp | Directs"
-    " | OnRunning"
-)
+_Last: TypeAlias = Terminate | Reject | End | GiveUp
+Following: TypeAlias = "ProcessState | Asked | Ways | OnTimer | TimerStarts | Waits | Directs | OnRunning | _Last"
 
 
 @dataclass(frozen=True, slots=True)

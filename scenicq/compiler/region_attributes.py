@@ -185,7 +185,9 @@ def _nearest_on(start: XY, end: XY, point: Node, span: Span) -> Node:
         )
         for axis in (0, 1)
     ]
-    share = build.arithmetic(ArithmeticOp.MAX, build.add(*parts, span), build.constant(0.0, span), span=span)
+    share = build.arithmetic(
+        ArithmeticOp.MAX, build.add(parts[0], parts[1], span), build.constant(0.0, span), span=span
+    )
     share = build.arithmetic(ArithmeticOp.MIN, share, build.constant(1.0, span), span=span)
     return build.vector_sum(build.constant(start, span), build.scale(build.constant(along, span), share, span), span)
 

@@ -151,7 +151,8 @@ class Arrivals:
         np.minimum.at(first_label, binding, table.labels)
         lives = _Lives.of(block, gap_s)
         # of each combination the binding, and the life of each object that has come
-        of, chosen = np.arange(len(bindings)), list[Members]()
+        of: Members = np.arange(len(bindings))
+        chosen: list[Members] = []
         for scene in self._scenes:
             for index in range(scene.first, scene.end):
                 fit = self._candidates(block, lives, scene.scenario.objects[index].category)

@@ -78,7 +78,7 @@ def test_a_table_has_a_field_a_role(town, crossing):
     found = town.match(crossing, every=True)
     table = found.to_arrow()
     assert table.column_names == [*("frame", "recording", "timestamp_us", "verdict"),
-                                  *("correspondence", "witness", "cause", "sensors")]  # fmt: skip
+                                  *("correspondence", "witness", "lanes", "cause", "sensors")]  # fmt: skip
     assert [field.name for field in table.schema.field("correspondence").type] == ["ego", "leftward", "rightward"]
     assert table.column("frame").to_pylist() == [each.frame for each in found]
     by_hand = {"recording": found[0].recording, "verdict": found[0].verdict, "timestamp_us": found[0].timestamp_us}

@@ -119,6 +119,25 @@ scenario Right():
             f"{EGO}b = {CARS}\nrequire b.position.x > 0\nrequire always b.speed < 4\nterminate after 1 seconds\n",
         ],
     ),
+    "what another scenario makes": (
+        f"""
+scenario Main():
+    setup:
+        ego = {CARS}
+    compose:
+        first = First()
+        second = Second(first.a, first.most)
+        do first, second
+scenario First():
+    setup:
+        a = {CARS}
+        most = 4
+scenario Second(car, most):
+    require always car.position.x < most
+    require (distance from car to ego) < 6
+""",
+        [f"{EGO}a = {CARS}\nrequire always a.position.x < 4\nrequire (distance from a to ego) < 6\n"],
+    ),
     "an ego of a scenario": (
         f"""
 scenario Main():
