@@ -31,7 +31,7 @@ __all__ = ["COMMANDS", "NOTHING", "UNDECIDED", "cli", "main"]
 COMMANDS = {
     "ingest": "Make a dataset from a source, such as a nuScenes folder.",
     "match": "Find the frames or intervals of a dataset that match a scenario.",
-    "gather": "Put the shards of a query together, in the order of the dataset.",
+    "gather": "Put the shards of a query together, in the order of the dataset or by what the program records.",
     "check": "Say whether a scenario is sound, and how it is read.",
     "sample": "Draw scenes from a scenario, as labels.",
     "explain": "Say why a frame or recording matches, or what prevents it and which change would make it match.",

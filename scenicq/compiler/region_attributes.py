@@ -9,7 +9,6 @@ from inspect import signature
 from itertools import pairwise
 from typing import cast
 
-from shapely import union_all
 from shapely.geometry import LineString, Point
 from shapely.ops import nearest_points
 
@@ -25,7 +24,7 @@ from scenicq.forest.nodes import ArithmeticOp, CompareOp, Constant, Node, PointI
 from scenicq.geometry.angles import heading_of
 from scenicq.geometry.regions import XY, PolygonSet, PolylineSet, Region, orientation_of
 from scenicq.geometry.road_direction import along_lines
-from scenicq.geometry.shapes import simple_parts
+from scenicq.geometry.shapes import simple_parts, union_all
 from scenicq.limits import LIMITS
 
 __all__ = ["REGION_METHODS", "corner", "holds_regions", "of_region"]

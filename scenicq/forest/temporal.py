@@ -353,8 +353,8 @@ class Process:
 
     @property
     def terminates(self) -> bool:
-        """Whether it may end the run."""
-        return any(isinstance(step, Terminate) for step in self.steps)
+        """Whether it may end the run, as it may where nobody knows how the run goes on."""
+        return any(isinstance(step, Terminate | GiveUp) for step in self.steps)
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
+    "ALONG",
     "azimuth",
     "azimuth_array",
     "difference",
@@ -15,6 +17,7 @@ __all__ = [
     "distance",
     "heading_of",
     "heading_of_array",
+    "leads",
     "normalize",
     "normalize_array",
     "rotate",
@@ -23,6 +26,13 @@ __all__ = [
 ]
 
 _TURN = 2 * math.pi
+ALONG = math.radians(60)
+"""How far a lane may lead from the heading of who is in it for it to be one of its own, where several are there."""
+
+
+def leads(ways: Iterable[float], heading: float) -> bool:
+    """Whether one of the directions of a lane is that of who goes there."""
+    return any(abs(math.remainder(way - heading, _TURN)) <= ALONG for way in ways)
 
 
 def normalize(angle: float) -> float:

@@ -17,9 +17,9 @@ from shapely import LineString
 from shapely.geometry import Polygon
 
 from scenicq.geometry import shapes
+from scenicq.geometry.angles import leads
 from scenicq.geometry.elements import Lane
 from scenicq.geometry.network import Network
-from scenicq.geometry.occupancy import leads
 from scenicq.geometry.shapes import Shape
 
 __all__ = ["ahead_in_lanes", "own_lanes", "stretch"]

@@ -14,7 +14,7 @@ falls into convex pieces.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TypeAlias
@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from shapely import STRtree
 
 from scenicq.geometry import shapes
+from scenicq.geometry.angles import leads
 from scenicq.geometry.cells import convex_parts
 from scenicq.geometry.fields import FieldCell
 from scenicq.geometry.network import TOLERANCE
@@ -31,10 +32,7 @@ from scenicq.geometry.regions import SLACK
 from scenicq.geometry.road_direction import RoadDirection
 from scenicq.geometry.shapes import Bounds, Shape
 
-__all__ = ["ALONG", "TOLERANCE", "ElementAtPoint", "Layer", "Occupancy", "OptionArea", "leads"]
-
-ALONG = math.radians(60)
-"""How far a lane may lead from the heading of who is in it for it to be one of its own, where several are there."""
+__all__ = ["TOLERANCE", "ElementAtPoint", "Layer", "Occupancy", "OptionArea"]
 
 _OVERLAP = 1e-6
 """Square metres that two elements may share without counting as overlapping."""
@@ -52,11 +50,6 @@ _Owners: TypeAlias = tuple[int, tuple[int, ...]]
 """The number of the layer that counts at a point, and the owners of its areas there."""
 _Meant: TypeAlias = tuple[bool, ...]
 """Which of the options at a point may be meant."""
-
-
-def leads(ways: Iterable[float], heading: float) -> bool:
-    """Whether some of the directions of a lane is that of who goes there."""
-    return any(abs(math.remainder(way - heading, math.tau)) <= ALONG for way in ways)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -16,7 +16,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from scenicq.geometry.occupancy import leads
+from scenicq.geometry.angles import leads
 from scenicq.store.motion import LONGEST_GAP_US, track_numbers
 
 __all__ = ["LanePairs", "last_lanes", "tracks_of_both"]

@@ -63,9 +63,8 @@ def test_dynamic_parts_are_ignored_on_request() -> None:
 
 
 def test_objects_in_the_setup_of_a_scenario_are_not_lost_in_silence() -> None:
-    text = "scenario Main():\n    setup:\n        ego = new Object\n"
-    with pytest.raises(ScenarioError, match="outside of its dynamic parts"):
-        compiled(text, initial=True)
+    text = "scenario Main():\n    setup:\n        ego = new Object\n        other = new Object at (0, 5)\n"
+    assert [thing.name for thing in compiled(text, initial=True).objects] == ["ego", "other"]
 
 
 def test_an_ego_set_in_a_function_is_the_ego() -> None:

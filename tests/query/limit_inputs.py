@@ -29,6 +29,7 @@ from programs import HEADER, PROGRAMS
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import Source
 from scenicq.forest.nodes import Constant, DirectionAt
+from scenicq.forest.show_modes import show_modes
 from scenicq.geometry.default_street import street
 from scenicq.geometry.regions import Disc, IntersectionOf, PolygonSet
 from scenicq.geometry.sampling import sampler
@@ -161,8 +162,30 @@ LANGUAGE = {
     "rounded": "x = Range(0, 3)\nego = new Car at (0, 0)\nrequire round(x) >= 1",
     "read twice": "ego = new Car at (0, 0)\nrequire (distance from (0, 1) < 3 and distance from (1, 2) to ego < 9 "
     "and distance from (0, 2) < 3 and distance from (1, 2) to ego < 9)",
+    "projected": "path = PolylineRegion([(0, 0), (10, 5), (20, -3)])\np = new Point at (Range(0, 20), 20)\n"
+    "ego = new Car at path.project(p)",
+    "variants": "scenario Main():\n    setup:\n        ego = new Car at (0, 0)\n    compose:\n"
+    "        do choose Left(), Right()\nscenario Left():\n    setup:\n        new Car at (-9, 0)\n"
+    "scenario Right():\n    setup:\n        new Car at (9, 0)",
     "monitored": "monitor M():\n    wait\n    wait\nego = new Car at (0, 0)\nrequire monitor M()",
 }
+LATER = """
+scenario Main():
+    setup:
+        ego = new Object at (Range(-9, 9), Range(-9, 9)), facing Range(0, 360) deg
+    compose:
+        wait
+        do Later()
+scenario Later():
+    setup:
+        other = new Object at (Range(-9, 9), Range(-9, 9)), facing Range(0, 360) deg
+    compose:
+        while (distance from other to ego) > 1:
+            wait
+"""
+"""Another object is there from the second sample on."""
+BENT = LATER.replace("other = new Object at (Range(-9, 9), Range(-9, 9))", "x = Range(-3, 3)\n        "
+                     "other = new Object at (x * x, Range(-9, 9) + x)")  # fmt: skip
 OVER_TIME_ON_ROADS = {
     "directions": "other = new Car\nrequire always abs((roadDirection at other) - other.heading) < 60 deg",
 }
@@ -228,6 +251,12 @@ def told(lines: object) -> Facts:
 def compiled(stores: Stores, text: str, **_: object) -> Facts:
     """A program that is compiled."""
     return told(compile_scenario(Source("p.scenic", HEADER + text), street(), behaviors="guards") is not None)
+
+
+def modes(stores: Stores, **_: object) -> Facts:
+    """The modes of a program."""
+    text = "behavior B():\n    while self.speed > 1:\n        wait\nego = new Car at (0, 0), with behavior B()"
+    return told(show_modes(compile_scenario(Source("p.scenic", HEADER + text), street(), behaviors="guards")))
 
 
 def near_frames(stores: Stores, text: str, **_: object) -> Facts:
@@ -412,6 +441,9 @@ INPUTS: Mapping[str, Callable[..., Facts]] = {
         prefilter=False,
     ),
     **{f"language: {name}": functools.partial(compiled, text=text) for name, text in LANGUAGE.items()},
+    "language: modes": modes,
+    "time: later": functools.partial(answers, store="time", text=LATER, head=""),
+    "time: later, bent": functools.partial(answers, store="time", text=BENT, head=""),
     "question: cases": by_cases,
     "question: box": held_box,
     "worker": worker,

@@ -34,7 +34,8 @@ from scenicq.forest.nodes import (
     Select,
 )
 from scenicq.forest.walk import children, is_leaf
-from scenicq.geometry.occupancy import ALONG, TOLERANCE, ElementAtPoint, Occupancy
+from scenicq.geometry.angles import ALONG
+from scenicq.geometry.occupancy import TOLERANCE, ElementAtPoint, Occupancy
 from scenicq.geometry.regions import Region
 from scenicq.limits import LIMITS
 from scenicq.match.tolerance import SLACK
