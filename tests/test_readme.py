@@ -55,6 +55,7 @@ def _run_block(kind, text, folder, command):
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+@pytest.mark.one_in(3)
 def test_what_a_page_shows_is_what_happens(page, crossroads, command, tmp_path):
     shutil.copytree(ROOT / "sample_data", tmp_path / "sample_data")
     if page.parent != ROOT:  # the first page says how `town` is made

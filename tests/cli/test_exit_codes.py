@@ -127,7 +127,7 @@ EXPLAINED = {
 
 
 @pytest.mark.parametrize("case", EXPLAINED)
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(6)
 def test_an_explanation_over_time_ends_as_the_table_says(run, crossroads, case):
     (program, named, *options), code = EXPLAINED[case]
     done = run("explain", "-e", program, crossroads, named, *options)

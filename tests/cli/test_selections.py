@@ -41,6 +41,7 @@ def result_lines(text):
 
 
 @pytest.mark.parametrize(("kind", "asked"), CASES)
+@pytest.mark.one_in(2)
 def test_all_ways_show_the_same(run, crossroads, tmp_path, kind, asked):
     program = tmp_path / "p.scenic"
     program.write_text(PROGRAMS[kind])

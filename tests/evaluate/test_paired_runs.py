@@ -110,6 +110,7 @@ def evaluated(run: Callable[..., Result], street: Path, runs: Path) -> Result:
 
 
 @pytest.mark.parametrize("column", ["recording", "frame"])
+@pytest.mark.one_in(2)
 def test_the_command_pairs_runs_with_what_they_rebuild(
     run: Callable[..., Result], street: Path, tmp_path: Path, column: str
 ) -> None:

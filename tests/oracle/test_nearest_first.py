@@ -141,6 +141,7 @@ WAYS = ["plain", "searched", "constrained first", "many roles", "smt", "monolith
 
 
 @pytest.mark.parametrize("way", WAYS)
+@pytest.mark.one_in(3)
 def test_the_nearest_correspondence_comes_first(way, monkeypatch):
     if way != "plain":
         monkeypatch.setattr(FirstFit, "fill", lambda *_: iter(()))

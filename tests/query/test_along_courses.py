@@ -200,7 +200,7 @@ def test_every_method_says_the_same(drawn: Drawn, method: str) -> None:
 
 
 @pytest.mark.parametrize("condition", CONDITIONS)
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(9)
 def test_over_time_each_sample_is_what_the_frame_is(drawn: Drawn, condition: str) -> None:
     frames = _found(drawn.dataset, f"{HEAD}require {condition}\n")
     text = f"{HEAD}require always ({condition})\n"

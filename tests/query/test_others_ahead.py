@@ -40,6 +40,7 @@ SLOW = [pytest.param(each, marks=pytest.mark.slow) for each in ("in a region", "
 
 
 @pytest.mark.parametrize("name", ["how many", "the nearest", *SLOW])
+@pytest.mark.one_in(2)
 def test_ahead_is_along_the_course_of_the_ego(crossroads, name):
     short, long = ALIKE[name]
     found, written = (verdicts(open_dataset(crossroads), text) for text in (short, long))

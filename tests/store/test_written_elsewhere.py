@@ -97,7 +97,7 @@ def words(name: str, out: object, town: Path) -> list[object]:
 
 @pytest.mark.parametrize("name", OUTPUTS)
 @pytest.mark.parametrize("bad_days", [0, 2])
-@pytest.mark.one_in(10)
+@pytest.mark.one_in(30)
 def test_the_bytes_are_those_that_are_written_here(
     name: str, bad_days: int, run: Any, crossroads: Path, bucket: Any, place: str, faults: Any, staged: Path,
     tmp_path: Path,
@@ -202,7 +202,7 @@ def fails(done: Any, fault: str, place: str) -> None:
 
 @pytest.mark.parametrize("fault", WORDS)
 @pytest.mark.parametrize("name", ["lines", "resumed", "interchange", "shard", "report", "dataset"])
-@pytest.mark.one_in(11)
+@pytest.mark.one_in(22)
 def test_what_cannot_be_written_is_told_before_the_work(
     name: str, fault: str, run: Any, crossroads: Path, bucket: Any, place: str, faults: Any, staged: Path,
     monkeypatch: pytest.MonkeyPatch,
@@ -255,7 +255,7 @@ def test_each_file_has_its_turn_to_fail(
 
 
 @pytest.mark.parametrize("name", [*FOLDERS, "dataset"])
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(6)
 def test_where_nothing_answers_any_more_no_half_looks_whole(
     name: str, run: Any, crossroads: Path, bucket: Any, place: str, faults: Any, staged: Path,
     monkeypatch: pytest.MonkeyPatch,

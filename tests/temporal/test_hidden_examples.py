@@ -52,6 +52,7 @@ def test_nothing_is_left_unknown_and_both_verdicts_are_there(found):
     assert {type(each.verdict) for each in found} == {Match, NoMatch}
 
 
+@pytest.mark.slow
 def test_a_match_is_proven_by_its_point(found, crossroads):
     dataset = open_dataset(crossroads)
     for each in found:

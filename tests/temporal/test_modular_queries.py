@@ -239,6 +239,7 @@ def traces(drawn):
 
 @pytest.mark.parametrize("name", SAME)
 @pytest.mark.parametrize("intervals", ["longest", "all"])
+@pytest.mark.one_in(4)
 def test_scenarios_find_what_plain_programs_find(name, intervals, traces):
     modular, plain = SAME[name]
     time = IntervalOptions(intervals=intervals)

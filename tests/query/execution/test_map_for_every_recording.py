@@ -118,7 +118,7 @@ def _expected(alone, program, **options):
 
 @pytest.mark.parametrize("options", [{}, {"prefilter": False}, {"ego": "any"}, {"all_matches": True}], ids=str)
 @pytest.mark.parametrize("program", PROGRAMS)
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(16)
 def test_a_map_for_every_recording_gives_what_each_map_alone_does(alone, together, program, options):
     expected = _expected(alone, PROGRAMS[program], **options)
     assert _asked(together, PROGRAMS[program], **options) == expected
@@ -126,6 +126,7 @@ def test_a_map_for_every_recording_gives_what_each_map_alone_does(alone, togethe
 
 
 @pytest.mark.parametrize("program", ["beside the ego", "along the road", "in the lane"])
+@pytest.mark.one_in(3)
 def test_frames_that_nobody_reads_proofs_of_are_the_same(alone, together, program):
     options = read_options(model=DRIVING)
     options = replace(options, proofs=False, reasons=False, interval_reasons=False)
@@ -165,6 +166,7 @@ def test_maps_are_read_when_a_candidate_needs_one(together, monkeypatch):
     assert len(read) == len(set(read))
 
 
+@pytest.mark.slow
 def test_a_dataset_that_says_nothing_of_its_maps_is_asked_alike(together, tmp_path):
     earlier = _dataset(tmp_path / "earlier", range(COUNT))
     file = earlier.path / "dataset.json"

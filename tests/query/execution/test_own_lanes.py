@@ -75,6 +75,7 @@ def test_intervals_name_those_at_their_first_frame(run, asked):
 
 
 @pytest.mark.parametrize("form", ["jsonl", "csv", "parquet"])
+@pytest.mark.one_in(3)
 def test_they_are_read_back(run, asked, tmp_path, form):
     file = tmp_path / f"found.{form}"
     run("match", *asked, "-o", file)
