@@ -128,11 +128,10 @@ def evaluate(results: tuple[AnyPath, ...], dataset: str, *, predictions: tuple[P
     if file is not None:
         check_writable(file)
     opened = open_checked(dataset)
-    models = name_models(predictions) if len(predictions) > 1 else ("",)
     found = judge(
         {name: _asked(each, opened) for name, each in zip(names, results, strict=True)},
         opened,
-        dict(zip(models, predictions, strict=True)),
+        dict(zip(name_models(predictions), predictions, strict=True)),
         distance_m=distance,
         least_score=least_score,
         missing=cast("Missing", missing),
@@ -145,8 +144,7 @@ def evaluate(results: tuple[AnyPath, ...], dataset: str, *, predictions: tuple[P
         _write(found, form, sink)
     show(found.warnings)
     if report is not None:
-        pages = found if len(models) > 1 else found.models[""]
-        write_pages(pages, opened, report, sensor_root(opened, sensors))
+        write_pages(found.only or found, opened, report, sensor_root(opened, sensors))
 
 
 def _asked(path: AnyPath, dataset: Dataset) -> Results:
@@ -165,7 +163,7 @@ def _format(name: str | None, file: AnyPath | None) -> str:
 def _write(found: ModelsEvaluation, form: str, sink: BinaryIO) -> None:
     match form:
         case "json":
-            record = models_record(found) if len(found.models) > 1 else evaluation_record(found.models[""])
+            record = models_record(found) if found.only is None else evaluation_record(found.only)
             content = json.dumps(record, ensure_ascii=False, indent=1, allow_nan=False)
             text = plain_json(content) + "\n"
         case "csv" | "spreadsheet":
@@ -191,8 +189,8 @@ def _write_parquet(found: ModelsEvaluation, sink: BinaryIO) -> None:
 
 
 def _text(found: ModelsEvaluation) -> str:
-    if len(found.models) == 1:
-        return "\n".join(_model(found.models[""]))
+    if found.only is not None:
+        return "\n".join(_model(found.only))
     lines = [*_titled(models_table(found)), ""]
     lines += [plain(each.sentence) for each in found.pairs]
     for name, each in found.models.items():

@@ -12,7 +12,7 @@ from scenicq.query.execution.pieces import gather as find_pieces
 from scenicq.query.execution.question_notes import noted_question
 from scenicq.query.execution.recorded_columns import columns_of_records
 from scenicq.query.execution.records import FrameRecord, IntervalRecord, read_record
-from scenicq.query.execution.result_selection import ResultSelection, read_sort, read_where
+from scenicq.query.execution.result_selection import ResultSelection
 from scenicq.query.execution.result_summary import ResultCount
 from scenicq.query.execution.result_tables import roles_of
 from scenicq.store.remote_path import AnyPath
@@ -77,10 +77,7 @@ def gather(ctx: click.Context, folder: AnyPath, *, format_: str | None, output: 
 def _selection(gathered: Gathered, where: str | None, sort: str | None) -> ResultSelection | None:
     if where is None and sort is None:
         return None
-    columns = columns_of_records(gathered.records())
-    return ResultSelection(
-        None if where is None else read_where(where, columns), None if sort is None else read_sort(sort, columns)
-    )
+    return ResultSelection.read(where, sort, columns_of_records(gathered.records()))
 
 
 def _write(gathered: Gathered, file: AnyPath | None, form: str, selection: ResultSelection | None) -> None:

@@ -190,8 +190,7 @@ def match(ctx: click.Context, scenario: str | None, dataset: str | None, *, prog
     check_combination(ctx, together)
     source, (target,), model = given_program(ctx, program, (scenario, dataset), 1)
     options = query_options({**given, "model": model})
-    by_recorded = options.where is not None or options.sort is not None
-    reads = report or export or rank or sample or shard or engine or resume or options.all_matches or by_recorded
+    reads = report or export or rank or sample or shard or engine or resume or options.all_matches or options.selects
     if chosen == "ids" and not reads:
         options = replace(options, proofs=False)
     summarized = summary or (sys.stderr.isatty() and not quiet)

@@ -337,10 +337,6 @@ class _ScenicLane:
         return along_centerline(self.id, self.polygon, lines)
 
     @property
-    def number(self) -> int:
-        return -1
-
-    @property
     def successors(self) -> list[_ScenicLane]:
         return [_ScenicLane(each, self.network) for each in _following(self.lane)]
 

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 from scenicq.compiler.coerce import read_over_time
 from scenicq.compiler.coroutines import (
@@ -29,7 +29,7 @@ from scenicq.compiler.coroutines import (
 )
 from scenicq.compiler.local_values import Held, LocalValues
 from scenicq.compiler.modular import SetUp, set_up
-from scenicq.compiler.overrides import overridden
+from scenicq.compiler.overrides import find_overrides
 from scenicq.compiler.process_graph import ProcessGraph, has_circle
 from scenicq.compiler.process_states import (
     BlockFrame,
@@ -48,8 +48,8 @@ from scenicq.compiler.process_states import (
     TogetherFrame,
     TryFrame,
     Ways,
+    ask_guards,
     free_timer,
-    guarded,
     timers_of,
 )  # fmt: skip
 from scenicq.compiler.values import Choice, Instance, ModelValue, describe, fail
@@ -80,9 +80,6 @@ from scenicq.forest.temporal import (
 )  # fmt: skip
 from scenicq.limits import LIMITS
 from scenicq.syntax import ast
-
-if TYPE_CHECKING:
-    pass
 
 __all__ = ["ARRIVES", "ComposedScenario", "Composition", "CompositionGraph"]
 
@@ -350,7 +347,7 @@ class CompositionGraph(ProcessGraph):
         after = replace(node, waiting=tuple(others))
         is_named = isinstance(first, Held) or not isinstance(first, ast.Call)
         found = self._entered(state, self.as_done(value, node.span), after, rest, is_named=is_named)
-        found = guarded(guards, found)
+        found = ask_guards(guards, found)
         return found if node.begun else Directs(Leave(self.within(state), 0), found)
 
     def _entered(
@@ -402,20 +399,19 @@ class CompositionGraph(ProcessGraph):
             found = Directs(PutBehavior(scenario.number, index, process, 0), found)
         if scenario.objects or not scenario.is_silent:
             found = Directs(Begin(scenario.number, 0), found)
-        for guards, node, span in reversed(scenario.asked):
-            found = self.test(state, node, guards, found, Reject(span), span)
+        found = self._asking(state, scenario.asked, found)
         if scenario.is_late:
             found = self.test(state, scenario.arrives, (), found, Reject(after.span), after.span)
         return found
 
     def _override(self, state: ProcessState, node: ast.Override, rest: ProcessState) -> Following:
-        """PutBehavior behaviors until the scenario ends."""
+        """Put behaviors in place of others until the scenario ends."""
         number, found = self.within(state), cast("Following", rest)
         if self.run.timed is None or self.run.timed.behaviors == "ignore":
             self.run.dynamic(node.kind, node.span)
             return rest
         scope = self.scope(state, self.call_of(state))
-        told = self._as_seen(state, lambda: overridden(self.run, node, scope))
+        told = self._as_seen(state, lambda: find_overrides(self.run, node, scope))
         for instance, behavior, span in reversed(told):
             process, asked = self._overriding(behavior, instance, span)
             found = self._asking(state, asked, found)
@@ -582,7 +578,7 @@ class CompositionGraph(ProcessGraph):
         scenario = self.scenarios[running.number]
         others = (*frame.scenarios[: frame.at], *frame.scenarios[frame.at + 1 :])
         without = on(scenarios=others)
-        over: Following = without if scenario.is_silent else Directs(Stop(running.number, 0), without)
+        over = self._stopped(running.number, without)
         match frame.stage:
             case "runs":
                 following = on(at=frame.at + 1)
@@ -601,14 +597,10 @@ class CompositionGraph(ProcessGraph):
                 return Directs(CheckSample(running.number, 0), found) if scenario.requirements else found
             case "inside":
                 # what it composes is over
-                return on(scenarios=others, stage="begins") if scenario.is_silent else Directs(
-                    Stop(running.number, 0), on(scenarios=others, stage="begins")
-                )  # fmt: skip
+                return self._stopped(running.number, on(scenarios=others, stage="begins"))
             case _:
                 found = on(at=frame.at + 1, stage="begins")
-                over = on(scenarios=others, stage="begins")
-                if not scenario.is_silent:
-                    over = Directs(Stop(running.number, 0), over)
+                over = self._stopped(running.number, on(scenarios=others, stage="begins"))
                 for guards, node, span, simulation in reversed(scenario.ends):
                     found = self.test(state, node, guards, Terminate(span) if simulation else over, found, span)
                 return found
@@ -643,8 +635,7 @@ class CompositionGraph(ProcessGraph):
             return found
         inner = next((each for each in state.frames[at + 1 :] if isinstance(each, TogetherFrame)), None)
         for each in reversed(inner.scenarios if inner is not None else ()):
-            if not self.scenarios[each.number].is_silent:
-                found = Directs(Stop(each.number, 0), found)
+            found = self._stopped(each.number, found)
         return found
 
     def _ended(self, state: ProcessState, span: Span) -> Following:
@@ -656,7 +647,11 @@ class CompositionGraph(ProcessGraph):
         number = frame.scenarios[frame.at].number
         others = (*frame.scenarios[: frame.at], *frame.scenarios[frame.at + 1 :])
         after = replace(state, frames=(*state.frames[:at], replace(frame, scenarios=others, stage="begins")))
-        return after if self.scenarios[number].is_silent else Directs(Stop(number, 0), after)
+        return self._stopped(number, after)
+
+    def _stopped(self, number: int, then: Following) -> Following:
+        """End a scenario, and go on; nothing ends of one that says nothing over time."""
+        return then if self.scenarios[number].is_silent else Directs(Stop(number, 0), then)
 
     @staticmethod
     def _losing(state: ProcessState) -> ProcessState:

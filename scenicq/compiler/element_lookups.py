@@ -124,7 +124,7 @@ class LookupTable:
             parts = [(part, *entry) for entry in layer for part in shapes.simple_parts([entry[0].polygon])]
             ids.append(tuple(area.id for _, area, _, _ in parts))
             ways.append(tuple(each.orientation if isinstance(each, Lane) else None for each in owners))
-            continued.append(tuple(map(_continued, owners)))
+            continued.append(tuple(each.continued if isinstance(each, Lane) else frozenset() for each in owners))
             names.append(tuple(owner.id for owner in owners))
             places.append(
                 tuple(
@@ -135,11 +135,6 @@ class LookupTable:
         self.occupancy = Occupancy(
             tuple(places), nothing, name, tuple(ids), tuple(ways), tuple(continued), tuple(names)
         )
-
-
-def _continued(owner: NetworkElement) -> frozenset[int]:
-    """The numbers of the lanes that a lane continues."""
-    return frozenset(each.number for each in (owner, *owner.predecessors)) if isinstance(owner, Lane) else frozenset()
 
 
 class Lookups:

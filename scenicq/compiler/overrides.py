@@ -12,7 +12,7 @@ from scenicq.syntax import ast
 if TYPE_CHECKING:
     from scenicq.compiler.interpreter import Interpreter
 
-__all__ = ["overridden", "override"]
+__all__ = ["find_overrides", "override"]
 
 _MOVING = frozenset(("position", "heading", "velocity", "speed", "angularSpeed", "angularVelocity", "yaw"))
 """Properties that no statement overrides."""
@@ -26,12 +26,12 @@ def override(run: Interpreter, node: ast.Override, scope: Environment) -> None:
     """
     if run.timed is None or run.timed.behaviors == "ignore":
         return run.dynamic(node.kind, node.span)
-    for instance, behavior, span in overridden(run, node, scope):
+    for instance, behavior, span in find_overrides(run, node, scope):
         run.timed.override(instance, behavior, span)
 
 
-def overridden(run: Interpreter, node: ast.Override, scope: Environment) -> list[tuple[Instance, ModelValue, Span]]:
-    """The objects whose behavior a statement overrides, each with the new one, and where it says so.
+def find_overrides(run: Interpreter, node: ast.Override, scope: Environment) -> list[tuple[Instance, ModelValue, Span]]:
+    """Find the objects whose behavior a statement overrides, each with the new one, and where it says so.
 
     Raises:
         ScenarioError: See `override`.

@@ -51,8 +51,8 @@ from scenicq.compiler.process_states import (
     Ways,
     WhileFrame,
     any_of,
+    ask_guards,
     free_timer,
-    guarded,
     timers_of,
 )  # fmt: skip
 from scenicq.compiler.scoping import bound_names
@@ -302,7 +302,7 @@ class ProcessGraph:
         if names.shared:
             raise self.refused(node.span)
         after = self.with_names(rest, number, names, node.span)
-        return guarded(guards, after)
+        return ask_guards(guards, after)
 
     def with_names(self, state: ProcessState, number: int, names: Environment, span: Span) -> Following:
         """A state with the variables of a call as they are now; random numbers among them are drawn."""
@@ -520,7 +520,7 @@ class ProcessGraph:
         if contract.over is not None and frame.lasted >= contract.least_steps:
             found = self.test(state, contract.over, (), following, found, self.span)
         asked = guards if not frame.phase and not frame.lasted else ()
-        found = guarded(asked, found)
+        found = ask_guards(asked, found)
         return replace(found, loose=True) if isinstance(found, Asked) else found
 
     def contracts_of(self, held: Held) -> tuple[tuple[Contract, ...], GraphGuards]:
@@ -596,7 +596,7 @@ class ProcessGraph:
                 value, guards = self.evaluated(state, node.iterable)
                 items = tuple([self.values.hold(each) for each in items_of(self.run, value, node.iterable.span)])
                 found = self.pushed(rest, ForFrame(node, self.items(items)))
-                return guarded(guards, found)
+                return ask_guards(guards, found)
             case ast.Break():
                 frames = self.left(state, node.span, WhileFrame, ForFrame).frames
                 return replace(state, frames=frames)
@@ -673,7 +673,7 @@ class ProcessGraph:
                 asked += guards
                 contracts += [contract] if contract is not None else []
             found = self.waits(rest, node.span, contracts)
-            return guarded(tuple(asked), found)
+            return ask_guards(tuple(asked), found)
 
         return self.with_drawn(state, values, node.span, taken)
 
@@ -742,7 +742,7 @@ class ProcessGraph:
             return self.limited(state, rest, (inner,), node.until, node.duration, node.unit)
 
         after = self.with_drawn(state, values, node.span, done)
-        return guarded(tuple(excluded), after)
+        return ask_guards(tuple(excluded), after)
 
     def as_done(self, value: ModelValue, span: Span) -> ModelValue:
         """What is done, as a call."""

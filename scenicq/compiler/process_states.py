@@ -44,8 +44,8 @@ __all__ = [
     "Ways",
     "WhileFrame",
     "any_of",
+    "ask_guards",
     "free_timer",
-    "guarded",
     "timers_of",
 ]  # fmt: skip
 
@@ -337,8 +337,8 @@ def any_of(ways: Sequence[Following]) -> Following:
     return ways[0] if len(ways) == 1 else Ways(tuple(ways))
 
 
-def guarded(guards: GraphGuards, then: Following) -> Following:
-    """What happens next, after what is asked for so that it can."""
+def ask_guards(guards: GraphGuards, then: Following) -> Following:
+    """Ask for what must hold, then go on."""
     return Asked(build.constant(True), guards, then, then) if guards else then
 
 

@@ -40,8 +40,10 @@ __all__ = [
     "compare",
     "distance_names",
     "few_clusters",
+    "in_points",
     "p_text",
     "percent",
+    "plural",
     "share_of",
 ]
 
@@ -125,23 +127,32 @@ class ShareComparison:
     @property
     def says(self) -> Says:
         """The verdict of the recordings on the objects in question."""
-        p_value = self.p_value if math.isnan(self.p_corrected) else self.p_corrected
         if self.missing:
             return "too little"
-        if p_value < _ALPHA:
+        if self._chance < _ALPHA:
             return "worse" if self.difference > 0 else "better"
         return "no worse" if self.interval[1] < self.margin else "too little"
+
+    @property
+    def _chance(self) -> float:
+        """The p-value that counts."""
+        return self.p_value if math.isnan(self.p_corrected) else self.p_corrected
+
+    @property
+    def _range(self) -> str:
+        """The interval of the difference in points, in words."""
+        low, high = (100 * end for end in self.interval)
+        return f"{low:+.0f} to {high:+.0f} points"
 
     @property
     def because(self) -> str:
         """Why there is no verdict; "" where there is one."""
         if self.says != "too little":
             return ""
-        low, high = (100 * end for end in self.interval)
-        told = "; ".join(self.missing) or f"the difference may be anything from {low:+.0f} to {high:+.0f} points"
+        told = "; ".join(self.missing) or f"the difference may be anything from {self._range}"
         if not self.more:
             return told
-        units = f"{self.more:,} more {self.unit}{'s' if self.more != 1 else ''} of this kind"
+        units = f"{self.more:,} more {plural(self.unit, self.more)} of this kind"
         return f"{told}; about {units} would tell a difference of {100 * _TOLD:g} points ({100 * _POWER:g} % power)"
 
     def conclude(self, whom: str) -> str:
@@ -155,7 +166,7 @@ class ShareComparison:
             text += f"; {p_text(self.p_value)}"
             if not math.isnan(self.p_corrected) and self.p_corrected != self.p_value:
                 text += f" (corrected {p_text(self.p_corrected)})"
-        text += f" over {self.recordings} {self.unit}{'s' if self.recordings != 1 else ''}"
+        text += f" over {self.recordings} {plural(self.unit, self.recordings)}"
         told = {
             "worse": f"worse than {whom}",
             "better": f"better than {whom}",
@@ -205,8 +216,13 @@ class ObjectComparison(ShareComparison):
     @property
     def beside(self) -> str:
         """Where the compared objects were found, in words."""
-        without = self.asked - sum(self.places)
-        return f"{self.about}: {', '.join([*self._places(), *([f'{without:,} without others'] if without else [])])}"
+        without = [f"{self._without:,} without others"] if self._without else []
+        return f"{self.about}: {', '.join([*self._places(), *without])}"
+
+    @property
+    def _without(self) -> int:
+        """How many objects in question have no others beside them."""
+        return self.asked - sum(self.places)
 
     def _places(self) -> list[str]:
         places = ("of the same frame", "of the same recording", f"of the same {self.unit}", "elsewhere")
@@ -232,14 +248,12 @@ class ObjectComparison(ShareComparison):
         }[self.says]
         certainty: list[str] = []
         if not math.isnan(self.interval[0]):
-            low, high = (100 * end for end in self.interval)
-            certainty.append(f"95 % interval {low:+.0f} to {high:+.0f} points")
+            certainty.append(f"95 % interval {self._range}")
         if not math.isnan(self.p_value):
-            certainty.append(p_text(self.p_value if math.isnan(self.p_corrected) else self.p_corrected))
-        certainty.append(f"{self.recordings} {self.unit}{'s' if self.recordings != 1 else ''}")
-        without = self.asked - sum(self.places)
+            certainty.append(p_text(self._chance))
+        certainty.append(f"{self.recordings} {plural(self.unit, self.recordings)}")
         left = [
-            *([f"{without:,} of {self.asked:,} objects, to which no other is alike"] if without else []),
+            *([f"{self._without:,} of {self.asked:,} objects, to which no other is alike"] if self._without else []),
             *([f"{self.uncounted:,} that do not count by the rules of the benchmark"] if self.uncounted else []),
             *([f"{undecided:,} undecided frames"] if undecided else []),
         ]
@@ -257,6 +271,17 @@ class ObjectComparison(ShareComparison):
         if not math.isnan(self.other.rate):
             text += f" against {percent(self.other)}"
         return text + self.conclude("others that are alike")
+
+
+def plural(what: str, number: int) -> str:
+    """What so many things are called."""
+    return what if number == 1 else f"{what}s"
+
+
+def in_points(difference: float, interval: Interval, unit: str = "") -> str:
+    """A difference of shares in points with its interval, if it has one."""
+    low, high = (100 * end for end in interval)
+    return f"{100 * difference:+.0f}{unit}" + ("" if math.isnan(low) else f" [{low:+.0f}, {high:+.0f}]")
 
 
 def p_text(value: float) -> str:

@@ -171,6 +171,11 @@ class ModelsEvaluation:
     pairs: tuple[PairedComparison, ...]
     warnings: tuple[Diagnostic, ...]
 
+    @property
+    def only(self) -> Evaluation | None:
+        """The evaluation where there is one model; None where there are several."""
+        return next(iter(self.models.values())) if len(self.models) == 1 else None
+
 
 def evaluate(
     results: Results | Mapping[str, Results],
@@ -206,10 +211,10 @@ def evaluate(
             that is no number.
     """
     found = evaluate_models(
-        results, dataset, {"": predictions}, distance_m=distance_m, least_score=least_score, missing=missing,
+        results, dataset, {"the model": predictions}, distance_m=distance_m, least_score=least_score, missing=missing,
         simulated=simulated, cluster=cluster, margin=margin, seed=seed,
     )  # fmt: skip
-    return found.models[""]
+    return next(iter(found.models.values()))
 
 
 def evaluate_models(
@@ -271,7 +276,7 @@ def evaluate_models(
     for number, (name, judge) in enumerate(judges.items()):
         own = tuple(found[number * len(matched) : (number + 1) * len(matched)])
         told = [*_warnings(own, judge.detection)]
-        if name:
+        if len(judges) > 1:
             told = [replace(each, message=f"{name}: {each.message}") for each in told]
         warnings += told
         models[name] = Evaluation(

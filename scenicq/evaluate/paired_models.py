@@ -17,6 +17,7 @@ from scenicq.evaluate.comparison import (
     ShareComparison,
     clusters_to_tell,
     few_clusters,
+    in_points,
     percent,
     share_of,
 )
@@ -60,8 +61,8 @@ class PairedComparison(ShareComparison):
         """All of it in one line."""
         if math.isnan(self.share.rate):
             return f"{self.about}: {self.model} and {self.baseline} have no object in common"
-        low, high = (100 * end for end in self.interval)
-        apart = "" if math.isnan(low) else f" ({100 * self.difference:+.0f} points [{low:+.0f}, {high:+.0f}])"
+        told = in_points(self.difference, self.interval, " points")
+        apart = "" if math.isnan(self.interval[0]) else f" ({told})"
         missed = f"{self.model} missed {percent(self.share)} of {self.about}, {self.baseline} {percent(self.other)}"
         return f"{missed}{apart}{self.conclude(self.baseline)}"
 

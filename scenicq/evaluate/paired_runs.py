@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scenicq.evaluate.comparison import Share, percent
+from scenicq.evaluate.comparison import Share, in_points, percent, plural
 from scenicq.evaluate.resampling import CLUSTERS, LEVEL, Interval, means_by, student, sums_by
 
 __all__ = ["PairedRuns", "pair_runs"]
@@ -55,11 +55,10 @@ class PairedRuns:
     @property
     def sentence(self) -> str:
         """All of it in words."""
-        units = f"{self.pairs} {self.unit}{'s' if self.pairs != 1 else ''}"
+        units = f"{self.pairs} {plural(self.unit, self.pairs)}"
         text = f"in {units} that runs rebuild {percent(self.real)} are missed and {100 * self.simulated:.0f} % failed"
         if not math.isnan(self.interval[0]):
-            low, high = (100 * end for end in self.interval)
-            text += f" ({100 * self.difference:+.0f} points [{low:+.0f}, {high:+.0f}])"
+            text += f" ({in_points(self.difference, self.interval, ' points')})"
         if math.isnan(self.explained):
             return text
         if self.explained <= 0:

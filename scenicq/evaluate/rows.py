@@ -9,7 +9,7 @@ from typing import Any
 from scenicq.evaluate.balance import Balance
 from scenicq.evaluate.benchmark import BenchmarkFigures
 from scenicq.evaluate.classes import ClassFigures
-from scenicq.evaluate.comparison import ObjectComparison, Share, ShareComparison, p_text
+from scenicq.evaluate.comparison import ObjectComparison, Share, ShareComparison, in_points, p_text
 from scenicq.evaluate.controls import PLACES
 from scenicq.evaluate.detection import FoundWithin
 from scenicq.evaluate.evaluation import Evaluation, ModelsEvaluation, ScenarioEvaluation
@@ -306,7 +306,8 @@ def models_rows(found: ModelsEvaluation) -> Iterator[dict[str, Any]]:
     A pair's others are the same objects, as the baseline has missed them.
     """
     for name, each in found.models.items():
-        yield from ({**row, "model": name or None} for row in flat_rows(each))
+        model = None if found.only is not None else name
+        yield from ({**row, "model": model} for row in flat_rows(each))
     for pair in found.pairs:
         yield _row(
             pair.scenario, "pairs", pair.about, group=pair.baseline, measure="missed", **_compared_figures(pair),
@@ -395,10 +396,7 @@ def balance_table(each: Balance) -> Table:
 
 def _points(each: ShareComparison) -> str:
     """The difference in points, with its interval."""
-    if math.isnan(each.difference):
-        return "-"
-    low, high = (100 * end for end in each.interval)
-    return f"{100 * each.difference:+.0f}" + ("" if math.isnan(low) else f" [{low:+.0f}, {high:+.0f}]")
+    return "-" if math.isnan(each.difference) else in_points(each.difference, each.interval)
 
 
 def frame_counts(scenario: ScenarioEvaluation) -> str:

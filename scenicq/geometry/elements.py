@@ -179,6 +179,11 @@ class Lane(LongElement):
     number: int = field(default=-1, repr=False, kw_only=True)
 
     @property
+    def continued(self) -> frozenset[int]:
+        """The numbers of the lanes that it continues: itself, and those that lead to it."""
+        return frozenset(each.number for each in (self, *self.predecessors))
+
+    @property
     def isForward(self) -> bool:
         """Whether it runs in its road's forward direction."""
         return self.sections[0].isForward

@@ -47,7 +47,7 @@ def own_lanes(network: Network, x: float, y: float, heading: float | None, last:
         lane
         for lane in lanes
         if (lane.orientation is not None and leads(lane.orientation.values(x, y), heading))
-        or (last is not None and last in {each.number for each in (lane, *lane.predecessors)})
+        or (last is not None and last in lane.continued)
     ]
     return meant or lanes
 

@@ -406,8 +406,7 @@ class Matches(Sequence[FrameResult]):
             {name: self.query}, self.query.dataset, dict(zip(models, paths, strict=True)), distance_m=distance_m,
             least_score=least_score, missing=missing, simulated=simulated, cluster=cluster, margin=margin, seed=seed,
         )  # fmt: skip
-        first, *others = judged.models.values()
-        return Judgement(judged if others else first, self.query.dataset)
+        return Judgement(judged.only or judged, self.query.dataset)
 
     def __repr__(self) -> str:
         """What was asked and, once known, how many results there are."""

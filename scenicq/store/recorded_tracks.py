@@ -5,7 +5,6 @@ Read when a course is asked for, a recording at a time; of those asked for last 
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 
 from scenicq.geometry.driven_courses import CoursePlace, lane_course, track_courses
 from scenicq.geometry.network import Network
+from scenicq.recent import Recent
 from scenicq.store.motion import slopes
 from scenicq.store.place import StoreFile
 from scenicq.store.reader import RowFile
@@ -72,17 +72,11 @@ class RecordedTracks:
         self._files = files
         self._runs: dict[str, tuple[int, int, int]] | None = None
         self._open: tuple[int, RowFile, RowFile] | None = None
-        self._kept: OrderedDict[str, RecordingCourses] = OrderedDict()
+        self._kept: Recent[str, RecordingCourses] = Recent(_KEPT)
 
     def of(self, recording: str) -> RecordingCourses:
         """A recording by its name."""
-        if recording in self._kept:
-            self._kept.move_to_end(recording)
-        else:
-            while len(self._kept) >= _KEPT:
-                self._kept.popitem(last=False)
-            self._kept[recording] = self._read(recording)
-        return self._kept[recording]
+        return self._kept.get(recording, lambda: self._read(recording))
 
     def rows(self, recording: str) -> tuple[int, int, int]:
         """The part that has a recording, and the rows of its labels there, the last left out."""

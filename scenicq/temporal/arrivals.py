@@ -166,8 +166,7 @@ class Arrivals:
         if int(repeats.sum()) > LIMITS.arrival_combinations:
             raise exhausted("arrival_combinations")
         origin = np.repeat(np.arange(len(table)), repeats)
-        inside = np.arange(int(repeats.sum())) - np.repeat(np.cumsum(repeats) - repeats, repeats)
-        combination = order[np.repeat(starts[binding], repeats) + inside]
+        combination = order[_spread(starts[binding], repeats)]
         # who comes later is not over before
         fits = np.ones(len(origin), np.bool_)
         for life in chosen:
@@ -196,8 +195,7 @@ class Arrivals:
         if int(counts.sum()) > LIMITS.arrival_combinations:
             raise exhausted("arrival_combinations")
         which = np.repeat(np.arange(len(of)), counts)
-        inside = np.arange(int(counts.sum())) - np.repeat(np.cumsum(counts) - counts, counts)
-        life = order[low[which] + inside]
+        life = order[_spread(low, counts)]
         keeps = lives.last[life] > first_label[of[which]]
         keeps &= (bindings[of[which]] != lives.track[life][:, None]).all(axis=1)
         for other in chosen:
@@ -227,7 +225,7 @@ class Arrivals:
             end = max(first + 1, int(np.searchsorted(total, before + _AT_ONCE, side="right")))
             mine = np.arange(first, end)
             which = np.repeat(mine, sizes[mine])
-            at = low[which] + np.arange(len(which)) - np.repeat(np.cumsum(sizes[mine]) - sizes[mine], sizes[mine])
+            at = _spread(low[mine], sizes[mine])
             members = {index: seen.members(bindings[of[which], place], at) for place, index in enumerate(indices)}
             for place, each in enumerate(chosen):
                 members[len(indices) + place] = seen.members(lives.track[each[which]], at)
@@ -304,6 +302,11 @@ def _as_shown(owner: ScenarioObject) -> ScenarioObject:
         for name, given in owner.properties.items()
     }
     return replace(owner, properties=properties, mutated=frozenset(), uncomparable={})
+
+
+def _spread(firsts: Members, counts: Members) -> Members:
+    """From each first number so many that follow, one run after the other."""
+    return np.arange(int(counts.sum())) + np.repeat(firsts - (np.cumsum(counts) - counts), counts)
 
 
 def _within(seen: NDArray[np.bool_], bounds: Members) -> NDArray[np.bool_]:

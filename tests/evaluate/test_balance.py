@@ -14,19 +14,11 @@ from scenicq.evaluate.clusters import find_clusters, parameters_of
 from scenicq.evaluate.evaluation import Evaluation, evaluate
 from scenicq.evaluate.pages import write_pages
 from scenicq.evaluate.rows import balance_table, evaluation_record
-from scenicq.importers.ingest import ingest
 from scenicq.query.execution.program_files import read_program
 from scenicq.query.execution.run import Query
-from scenicq.store.dataset import Dataset, open_dataset
+from scenicq.store.dataset import Dataset
 
 PARKED = Path(__file__).parents[2] / "sample_data" / "parked"
-
-
-@pytest.fixture(scope="module")
-def street(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
-    folder = tmp_path_factory.mktemp("street") / "street"
-    ingest(PARKED, folder)
-    return open_dataset(folder)
 
 
 @pytest.fixture(scope="module")

@@ -23,7 +23,6 @@ from scenicq.evaluate.region_of_interest import RegionOfInterest
 from scenicq.evaluate.rows import COLUMNS, evaluation_record, flat_rows, overview
 from scenicq.evaluate.simulation import read_simulated
 from scenicq.geometry.features import MapFeature
-from scenicq.importers.ingest import ingest
 from scenicq.importers.motion import euler
 from scenicq.importers.prediction_files import read_predictions
 from scenicq.importers.predictions import ARGOVERSE2, NUSCENES, Predictions
@@ -38,13 +37,6 @@ from scenicq.store.writer import write_dataset
 
 SAMPLES = Path(__file__).parents[2] / "sample_data"
 PARKED = SAMPLES / "parked"
-
-
-@pytest.fixture(scope="module")
-def street(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
-    folder = tmp_path_factory.mktemp("street") / "street"
-    ingest(PARKED, folder)
-    return open_dataset(folder)
 
 
 @pytest.fixture(scope="module")

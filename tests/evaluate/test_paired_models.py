@@ -23,11 +23,10 @@ from scenicq.evaluate.evaluation import ModelsEvaluation, evaluate, evaluate_mod
 from scenicq.evaluate.paired_models import PairedComparison, compare_pair
 from scenicq.evaluate.resampling import discordance_test
 from scenicq.evaluate.rows import evaluation_record
-from scenicq.importers.ingest import ingest
 from scenicq.importers.prediction_files import read_predictions
 from scenicq.query.execution.program_files import read_program
 from scenicq.query.execution.run import Query
-from scenicq.store.dataset import Dataset, open_dataset
+from scenicq.store.dataset import Dataset
 
 PARKED = Path(__file__).parents[2] / "sample_data" / "parked"
 Bools = NDArray[np.bool_]
@@ -170,13 +169,6 @@ def test_models_are_called_by_what_tells_them_apart() -> None:
 
 
 @pytest.fixture(scope="module")
-def street(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
-    folder = tmp_path_factory.mktemp("street") / "street"
-    ingest(PARKED, folder)
-    return open_dataset(folder)
-
-
-@pytest.fixture(scope="module")
 def better(street: Dataset) -> Path:
     """A file of a model that finds every second parked car, too."""
     lines = [json.loads(line) for line in (PARKED / "predictions.jsonl").read_text().splitlines()]
@@ -293,3 +285,10 @@ def test_a_notebook_has_several_models(street: Dataset, better: Path, both: Mode
         for each in both.pairs
     ]
     assert told._repr_html_().count("<h4>") == 2
+
+
+def test_warnings_of_one_model_do_not_name_it(street: Dataset) -> None:
+    program = (PARKED / "parked_car.scenic").read_text() + "\nrequire (distance to parkedCar) < 7\n"
+    told = scenicq.open(street.path).match(program).evaluate(PARKED / "predictions.jsonl").evaluation
+    (warning,) = [each for each in told.warnings if each.code == "no-verdict"]
+    assert warning.message.startswith("program: no verdict on role parkedCar")

@@ -12,7 +12,7 @@ import pytest
 from click.testing import Result
 
 from scenicq.evaluate.paired_runs import PairedRuns, pair_runs
-from scenicq.importers.ingest import ingest
+from scenicq.store.dataset import Dataset
 
 PARKED = Path(__file__).parents[2] / "sample_data" / "parked"
 
@@ -97,22 +97,15 @@ def test_what_cannot_be_taken_from_simulation() -> None:
     assert pair_runs(scene / 12, np.full(10, -1), scene, missed, cluster, "drive") is None
 
 
-@pytest.fixture(scope="module")
-def street(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("street") / "street"
-    ingest(PARKED, folder)
-    return folder
-
-
-def evaluated(run: Callable[..., Result], street: Path, runs: Path) -> Result:
-    return run("evaluate", PARKED / "parked_car.scenic", street, "--predictions", PARKED / "predictions.jsonl",
+def evaluated(run: Callable[..., Result], street: Dataset, runs: Path) -> Result:
+    return run("evaluate", PARKED / "parked_car.scenic", street.path, "--predictions", PARKED / "predictions.jsonl",
                "--simulated", runs, "--format", "json")  # fmt: skip
 
 
 @pytest.mark.parametrize("column", ["recording", "frame"])
 @pytest.mark.one_in(2)
 def test_the_command_pairs_runs_with_what_they_rebuild(
-    run: Callable[..., Result], street: Path, tmp_path: Path, column: str
+    run: Callable[..., Result], street: Dataset, tmp_path: Path, column: str
 ) -> None:
     plain = json.loads(evaluated(run, street, PARKED / "runs.csv").stdout)["scenarios"][0]
     assert plain["simulated"]["paired"] is None

@@ -299,8 +299,8 @@ class Decider:
         from scenicq.query.execution.own_lanes import OwnLanes  # noqa: PLC0415
 
         def make() -> OwnLanes | None:
-            asked = OwnLanes(self.plan_map(map_name).scenario).asked
-            return OwnLanes(self.compile_map(map_name).scenario) if asked else None
+            planned = self.plan_map(map_name)
+            return OwnLanes(self.compile_map(map_name).scenario) if OwnLanes(planned.scenario).asked else None
 
         return self._own_lanes.get(map_name, make)
 

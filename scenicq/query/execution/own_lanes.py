@@ -5,10 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
-from itertools import groupby
-
-import numpy as np
+from functools import cached_property, lru_cache, partial
 
 from scenicq.compiler.element_lookups import LOOKUPS, LookupTable
 from scenicq.forest.nodes import AheadInLanes, Constant, DirectionAt, Feature, Node
@@ -18,12 +15,11 @@ from scenicq.forest.walk import postorder
 from scenicq.geometry.network import Network
 from scenicq.geometry.occupancy import ElementAtPoint, Occupancy
 from scenicq.match.verdict import Match
-from scenicq.query.execution.members import Members
+from scenicq.query.execution.members import Members, fill_by_recording
 from scenicq.query.execution.results import Result, Standing
 from scenicq.store.dataset import Dataset
 from scenicq.store.labels import Label
 from scenicq.store.reader import LAST
-from scenicq.store.track_block import TrackBlock
 
 __all__ = ["OwnLanes", "show_standing"]
 
@@ -110,24 +106,16 @@ class OwnLanes:
             dataset: The dataset.
             results: The intervals, those of one recording together.
         """
-        for recording, several in groupby(results, lambda each: each.recording):
-            mine = list(several)
-            if any(isinstance(each.verdict, Match) for each in mine):
-                yield from self._of_recording(dataset, recording, mine)
-            else:
-                yield from mine
+        return fill_by_recording(results, partial(self._of_recording, dataset))
 
     def _of_recording(self, dataset: Dataset, recording: str, results: Iterable[Result]) -> Iterator[Result]:
-        part, first, end = dataset.recorded.rows(recording)
-        with TrackBlock(dataset, part, [(first, end)]) as block:
-            numbers = {name: number for number, name in enumerate(block.frames(np.arange(len(block))))}
-            members = Members(block)
-            columns = [block.numbers(name) for name in ("x", "y", "heading", LAST)]
+        with Members.of_recording(dataset, recording) as members:
+            columns = [members.block.numbers(name) for name in ("x", "y", "heading", LAST)]
             for each in results:
                 if not isinstance(each.verdict, Match):
                     yield each
                     continue
-                roles, number = each.verdict.correspondence, numbers[each.frame]
+                roles, number = each.verdict.correspondence, members.numbers[each.frame]
                 playing = {
                     name: int(members.along(roles[name], number, number + 1)[0]) for name in self.asked if name in roles
                 }

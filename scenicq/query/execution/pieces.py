@@ -86,7 +86,7 @@ def fingerprint(dataset: Dataset, program: str, options: QueryOptions) -> str:
     asked = asdict(options)
     asked["match"]["enforce"] = sorted(asked["match"]["enforce"])
     asked["match"]["ignore_params"] = sorted(asked["match"]["ignore_params"])
-    if options.where is not None or options.sort is not None:
+    if options.selects:
         # of the matches that are shown, which is seen to afterwards
         asked["limit"] = None
     for name in ("jobs", "prefilter", "strict", "until", "where", "sort"):

@@ -10,7 +10,7 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import groupby, product
+from itertools import product
 from typing import cast
 
 import numpy as np
@@ -27,7 +27,7 @@ from scenicq.limits import LIMITS
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.conditioned import options_of
 from scenicq.match.verdict import Match, WitnessValue
-from scenicq.query.execution.members import Members
+from scenicq.query.execution.members import Members, fill_by_recording
 from scenicq.query.execution.results import Recorded, RecordedCell, Result
 from scenicq.store.dataset import Dataset
 from scenicq.store.track_block import TrackBlock
@@ -87,31 +87,20 @@ class Recorder:
 
     def fill(self, results: Sequence[Result]) -> list[Result]:
         """The same results, in which matches carry what is recorded."""
-        found: list[Result] = []
-        for recording, several in groupby(results, lambda each: each.recording):
-            mine = list(several)
-            if any(isinstance(each.verdict, Match) for each in mine):
-                found += self._of_recording(recording, mine)
-            else:
-                found += mine
-        return found
+        return list(fill_by_recording(results, self._of_recording))
 
     def _of_recording(self, recording: str, results: list[Result]) -> Iterator[Result]:
-        part, first, end = self.dataset.recorded.rows(recording)
-        with TrackBlock(self.dataset, part, [(first, end)]) as block:
-            numbers = {name: number for number, name in enumerate(block.frames(np.arange(len(block))))}
-            members = Members(block)
-            matching = [each for each in results if isinstance(each.verdict, Match)]
-            placed = [self._placed(members, numbers, each) for each in matching]
+        with Members.of_recording(self.dataset, recording) as members:
+            placed = [self._placed(members, each) for each in results if isinstance(each.verdict, Match)]
             recorded: list[Mapping[str, Recorded]] = []
             for some in _in_pieces(placed):
-                recorded += self._recorded(block, some)
+                recorded += self._recorded(members.block, some)
         told = iter(recorded)
         for each in results:
             yield replace(each, recorded=next(told)) if isinstance(each.verdict, Match) else each
 
-    def _placed(self, members: Members, numbers: Mapping[str, int], result: Result) -> _Placed:
-        first = numbers[result.frame]
+    def _placed(self, members: Members, result: Result) -> _Placed:
+        first = members.numbers[result.frame]
         end = first + (1 if result.interval is None else result.interval.count)
         roles = cast(Match, result.verdict).correspondence
         who = members.at if result.interval is None else members.along

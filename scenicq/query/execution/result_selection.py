@@ -97,6 +97,27 @@ class ResultSelection:
     beyond: int = 0
     last: Result | Record | None = field(default=None)
 
+    @classmethod
+    def read(
+        cls, where: str | None, sort: str | None, columns: Sequence[RecordedColumn], limit: int | None = None
+    ) -> ResultSelection:
+        """The selection that a user asks for.
+
+        Args:
+            where: The condition; None for all matches.
+            sort: What they are ordered by; None for the order of the dataset.
+            columns: What is recorded; see `read_where`.
+            limit: How many are shown at most.
+
+        Raises:
+            DataError: option-invalid: there is no such value.
+        """
+        return cls(
+            None if where is None else read_where(where, columns),
+            None if sort is None else read_sort(sort, columns),
+            limit,
+        )
+
     def chosen(self) -> Chosen:
         """What was chosen, once the results are taken."""
         where, sort = ("" if each is None else each.text for each in (self.where, self.sort))

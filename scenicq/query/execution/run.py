@@ -37,7 +37,7 @@ from scenicq.query.execution.merged_blocks import merge_frames, merge_intervals,
 from scenicq.query.execution.never_compared import Coverage, coverage
 from scenicq.query.execution.program_files import SiblingFiles
 from scenicq.query.execution.recorded_columns import RecordedColumn, columns_of
-from scenicq.query.execution.result_selection import ResultSelection, read_sort, read_where
+from scenicq.query.execution.result_selection import ResultSelection
 from scenicq.query.execution.results import Funnel, Result, up_to
 from scenicq.query.execution.scenario_copies import ScenarioCopies
 from scenicq.query.prefilter.executor import Block, Extent, blocks, blocks_of, extents, names, whole_recordings
@@ -112,6 +112,11 @@ class QueryOptions:
     reasons: bool = True
     interval_reasons: bool = True
     until: float | None = None
+
+    @property
+    def selects(self) -> bool:
+        """Whether what the program records says which matches are shown, or in what order."""
+        return self.where is not None or self.sort is not None
 
 
 @dataclass(frozen=True, slots=True)
@@ -491,8 +496,7 @@ class Query:
     @property
     def limit(self) -> int | None:
         """Matches after which to stop; None for all, as where it is chosen among all that match."""
-        chosen = self.options.where is not None or self.options.sort is not None
-        return None if chosen else self.options.limit
+        return None if self.options.selects else self.options.limit
 
     def selection(self) -> ResultSelection | None:
         """Which matches are shown and in what order, by what the program records; None where all are, as they come.
@@ -500,15 +504,10 @@ class Query:
         Raises:
             DataError: option-invalid: there is no such value.
         """
-        where, sort = self.options.where, self.options.sort
-        if where is None and sort is None:
+        options = self.options
+        if not options.selects:
             return None
-        columns = self.recorded_columns()
-        return ResultSelection(
-            None if where is None else read_where(where, columns),
-            None if sort is None else read_sort(sort, columns),
-            self.options.limit,
-        )
+        return ResultSelection.read(options.where, options.sort, self.recorded_columns(), options.limit)
 
     def results(self, progress: Callable[[int], None] | None = None) -> Generator[Result]:
         """Results in the order of recording, time and frame, map by map.

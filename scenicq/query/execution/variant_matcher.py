@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,15 +50,9 @@ class VariantMatcher:
             found.broken.update(each.broken)
         results = [result for each in parts for result in each.results]
         results.sort(key=lambda each: (each.recording, each.timestamp_us, _end_us(each)))
-        by_recording: dict[str, list[Result]] = {}
-        for each in results:
-            by_recording.setdefault(each.recording, []).append(each)
-        found.results = [
-            each
-            for mine in by_recording.values()
-            for each in mine
-            if not any(_says_more(other, each) for other in mine)
-        ]
+        for _, several in groupby(results, lambda each: each.recording):
+            mine = list(several)
+            found.results += [each for each in mine if not any(_says_more(other, each) for other in mine)]
         return found
 
 
