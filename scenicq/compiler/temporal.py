@@ -247,7 +247,9 @@ class TimedStatements:
         self._follow_processes(run, requirements)
         processes, scenarios = self._in_order()
         conditions = (*nodes, *self._nodes)
-        dynamics = Dynamics(conditions, tuple(requirements), tuple(self.terminations), processes, scenarios)
+        # as with a monitor's `terminate`, what the program's own values rule out is no end
+        ends = tuple(e for e in self.terminations if e.condition is None or _known(e.condition, nodes) is not False)
+        dynamics = Dynamics(conditions, tuple(requirements), ends, processes, scenarios)
         return dynamics, excluded
 
     def _follow_processes(self, run: Interpreter, requirements: list[TemporalRequirement]) -> None:

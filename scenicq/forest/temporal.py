@@ -381,7 +381,7 @@ class Dynamics:
     Attributes:
         conditions: Boolean expressions, each about one sample: what atoms are.
         requirements: Requirements with operators of time.
-        terminations: What ends a run; without any it may end anywhere.
+        terminations: What ends a run, but what the program's own values rule out; without any it may end anywhere.
         processes: What composes scenarios, monitors that are required, then behaviors of objects, in the order in
             which they run.
         scenarios: Scenarios that begin within a run.

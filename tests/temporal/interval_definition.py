@@ -63,10 +63,11 @@ Situation = tuple[Trace, dict[str, str], float]
 
 @dataclass(frozen=True)
 class Condition:
-    """An atom: its text, and its value at a sample, None where it is not observed."""
+    """An atom: its text, its value at a sample, None where it is not observed, and whether it holds of everything."""
 
     text: str
     value: Callable[[Situation, int], bool | None]
+    always: bool = False
 
 
 def random_condition(draw: random.Random, roles: list[str], hidden: bool) -> Condition:
@@ -90,7 +91,8 @@ def random_condition(draw: random.Random, roles: list[str], hidden: bool) -> Con
                 p, q = (place(s, k, role), place(s, k, other)) if role != other else ((0.0, 0.0), (0.0, 0.0))
                 return None if p is None or q is None else math.dist(p, q) < abs(number) + 2.1
 
-            return Condition(f"((distance from {role} to {other}) < {abs(number) + 2.1})", near)
+            text = f"((distance from {role} to {other}) < {abs(number) + 2.1})"
+            return Condition(text, near, always=role == other)
         case "speed":
 
             def fast(s: Situation, k: int) -> bool | None:
@@ -264,6 +266,17 @@ def monitored(kind: str, atoms: list[Condition], truth: Truth, i: int, j: int) -
     return ""
 
 
+def may_end(kind: str, atoms: list[Condition]) -> bool:
+    """Whether a monitor ends some run: whatever may be observed is, at each sample anew."""
+    draw = random.Random(0)
+    for _ in range(300):
+        said = MONITORS[kind][2](lambda number: atoms[number].always or draw.random() < 0.5)
+        for _ in range(8):
+            if next(said, "") == "end":
+                return True
+    return False
+
+
 @dataclass
 class Program:
     """A dynamic program with up to two roles."""
@@ -279,8 +292,8 @@ class Program:
 
     @property
     def terminates(self) -> bool:
-        """Whether it says when it ends."""
-        return bool(self.ends) or self.after_s is not None or any(kind != "demands" for kind, _ in self.monitors)
+        """Whether it says when it ends: a `terminate` to which no observation leads is none."""
+        return bool(self.ends) or self.after_s is not None or any(may_end(*each) for each in self.monitors)
 
     def text(self) -> str:
         """The program in Scenic."""
