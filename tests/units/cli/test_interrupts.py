@@ -175,7 +175,7 @@ def info():
     except Exception:
         import native  # an extension module may end the process here
     finally:
-        print(getattr(sys.modules.get("native"), "whole", None))
+        sys.stdout.write(f"{getattr(sys.modules.get('native'), 'whole', None)}\\n")  # once: an interrupt may follow
     time.sleep(5)
     print("went on")
 
