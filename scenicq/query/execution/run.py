@@ -469,8 +469,8 @@ class Query:
         last: CompiledMap | None = None
         for name in filter(self.frames, self.dataset.maps):
             here = None if name in lacking else self.planned_map(name)
-            # what happens over time, or is recorded, is of one map
-            joins = here is not None and here is last and not (self.over_time(here.scenario) or here.scenario.records)
+            # what is recorded is of one map
+            joins = here is not None and here is last and not here.scenario.records
             if run and not joins:
                 yield run
                 run = []
