@@ -153,8 +153,8 @@ class ConditionReader:
         Args:
             item: The feature, of an object, with its expression.
             meant: The elements that may be meant where the ego is, where that is to be proved.
-            heading: Of a position: what the heading is compared with, which is told with it where it is that of the
-                lane that the object is in.
+            heading: What the object's heading is compared with, for a position: it is told with it where it is that
+                of the lane that the object is in.
         """
         index, node = item.object, item.expression
         objects = self._objects(node, about=index)

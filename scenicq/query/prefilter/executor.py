@@ -118,7 +118,7 @@ class Block:
         return replace(self, map=own, first=runs[0][0], end=runs[-1][1], runs=runs, maps=maps)
 
     def by_map(self) -> list[Block]:
-        """Of a query over time: its recordings on each map."""
+        """The recordings of a query over time, map by map."""
         if not self.maps:
             return [self]
         ends = [n for n in range(1, len(self.maps)) if self.maps[n] != self.maps[n - 1]]
