@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 
 from scenicq.forest.bounds import Box
+from scenicq.forest.nodes import ArithmeticOp
 from scenicq.geometry import shapes
 from scenicq.geometry.cells import convex_parts
 from scenicq.geometry.membership import bounds as region_bounds
@@ -17,8 +18,9 @@ from scenicq.geometry.shapes import Shape
 from scenicq.geometry.terms import overlap, rectangle_shape
 from scenicq.limits import LIMITS
 from scenicq.smt.distance_terms import BoxTerms, dot, minus
-from scenicq.smt.formula import FALSE, TRUE, Formula, Num, Operator, apply, compare, conjunction, disjunction
+from scenicq.smt.problem import Formula
 from scenicq.smt.region_membership import UnsupportedError, convex_cell, disc
+from scenicq.smt.terms import FALSE, TRUE, apply, compare, conjunction, disjunction, number
 
 __all__ = ["box_holds"]
 
@@ -40,7 +42,7 @@ def box_holds(box: BoxTerms, region: Region, around: Box) -> Formula:
         case Nowhere():
             return FALSE
         case Disc():
-            center = (Num(region.center[0]), Num(region.center[1]))
+            center = (number(region.center[0]), number(region.center[1]))
             return conjunction(disc(*minus(corner, center), region.radius) for corner in box.corners())
         case Rectangle():
             return _area_holds(box, rectangle_shape(region), around)
@@ -89,12 +91,12 @@ def _missed(box: BoxTerms, ax: float, ay: float, bx: float, by: float) -> Formul
     length = math.hypot(bx - ax, by - ay)
     if length == 0.0:
         return TRUE
-    ends = [minus((Num(x), Num(y)), box.center) for x, y in ((ax, ay), (bx, by))]
+    ends = [minus((number(x), number(y)), box.center) for x, y in ((ax, ay), (bx, by))]
     sides: list[Formula] = []
     for axis, half in ((box.right, box.half_width), (box.ahead, box.half_length)):
         places = [dot(end, axis) for end in ends]
-        sides.append(compare(">=", apply(Operator.MIN, *places), half))
-        sides.append(compare("<=", apply(Operator.MAX, *places), apply(Operator.NEG, half)))
-    across = (Num((by - ay) / length), Num((ax - bx) / length))
-    sides.append(compare(">=", apply(Operator.ABS, dot(ends[0], across)), box.extent(across)))
+        sides.append(compare(">=", apply(ArithmeticOp.MIN, *places), half))
+        sides.append(compare("<=", apply(ArithmeticOp.MAX, *places), apply(ArithmeticOp.NEG, half)))
+    across = (number((by - ay) / length), number((ax - bx) / length))
+    sides.append(compare(">=", apply(ArithmeticOp.ABS, dot(ends[0], across)), box.extent(across)))
     return disjunction(sides)

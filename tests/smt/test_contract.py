@@ -19,28 +19,16 @@ from pathlib import Path
 
 import pytest
 from built_in import BuiltIn
+from formulas import Var, Variable
 
 from scenicq.errors import SolverError
+from scenicq.forest.nodes import ArithmeticOp
 from scenicq.smt.answer import Answer, NoAnswer, Sat, SolverSession, Unsat
-from scenicq.smt.evaluation import holds
-from scenicq.smt.formula import (
-    FALSE,
-    TRUE,
-    Formula,
-    Operator,
-    Problem,
-    Term,
-    Var,
-    Variable,
-    apply,
-    compare,
-    conjunction,
-    disjunction,
-    negation,
-)
+from scenicq.smt.problem import Formula, Problem, Term, holds
 from scenicq.smt.solver import open_solver
+from scenicq.smt.terms import FALSE, TRUE, apply, compare, conjunction, disjunction, negation
 
-Fn = Operator
+Fn = ArithmeticOp
 X, Y, Z, H = Var("x"), Var("y"), Var("z"), Var("h")
 PRECISION = 1e-3
 INF = math.inf
