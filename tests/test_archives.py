@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-ARCHIVES = runpy.run_path(str(Path(__file__).parent / "dependencies" / "archives.py"))
+ARCHIVES = runpy.run_path(str(Path(__file__).parent / "tools/dependencies/archives.py"))
 
 
 @pytest.fixture(scope="module")

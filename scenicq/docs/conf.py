@@ -53,12 +53,13 @@ CONTENTS = {
         "scenicq/limits",
         "scenicq/evaluate/README",
     ],
+    "What commands say": ["tests/transcripts/*"],
     "Contributing": [
         "scenicq/docs/CONTRIBUTING",
         "scenicq/README",
         "scenicq/decisions/README",
         "scenicq/decisions/*",
-        "tests/conformance/README",
+        "tests/tools/conformance/README",
     ],
     "Releases": [f"scenicq/docs/{name}" for name in ("CHANGELOG", "versions", "licences", "SECURITY")],
 }
