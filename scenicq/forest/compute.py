@@ -11,6 +11,7 @@ import math
 from functools import lru_cache
 from typing import Any, cast
 
+from scenicq.errors import CannotEvaluate
 from scenicq.forest.kinds import kind_of_value
 from scenicq.forest.nodes import (
     AheadInLanes,
@@ -72,17 +73,12 @@ from scenicq.geometry.regions import (
     union,
 )
 from scenicq.geometry.shapes import GeometryError
-from scenicq.geometry.terms import UndecidedError
 
-__all__ = ["FAR_M", "CannotEvaluate", "compute", "directions", "fold"]
+__all__ = ["FAR_M", "compute", "directions", "fold"]
 
 
 FAR_M = 1e12
 """Metres that stand for any greater distance along a course, with which can be reckoned."""
-
-
-class CannotEvaluate(Exception):
-    """A question that plain evaluation cannot answer; the message says which."""
 
 
 _Numbers = tuple[float, ...]
@@ -177,8 +173,6 @@ def compute(node: Node, args: tuple[Value, ...]) -> Value:
             return arg
     try:
         return _compute(node, args)
-    except UndecidedError as error:
-        raise CannotEvaluate(str(error)) from None
     except (ArithmeticError, TypeError, ValueError, GeometryError) as error:
         # such as numbers that are finite and whose sum is not
         raise CannotEvaluate(f"{type(node).__name__} of these values: {error}") from None

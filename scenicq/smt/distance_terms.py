@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
+from scenicq.errors import CannotEvaluate
 from scenicq.forest.bounds import Box
 from scenicq.forest.nodes import ArithmeticOp
 from scenicq.geometry.boxes import corners as box_corners
@@ -23,7 +24,7 @@ from scenicq.geometry.membership import bounds as region_bounds
 from scenicq.geometry.regions import Disc, PointSet, PolygonSet, PolylineSet, Rectangle, Region, UnionOf
 from scenicq.limits import LIMITS
 from scenicq.smt.problem import Formula, Term
-from scenicq.smt.region_membership import TermVector, UnsupportedError, convex_cell, disc
+from scenicq.smt.region_membership import TermVector, convex_cell, disc
 from scenicq.smt.terms import apply, compare, conjunction, disjunction, number
 
 __all__ = [
@@ -114,7 +115,7 @@ def _points(region: Region) -> np.ndarray:
             points = np.array(region.points, dtype=float).reshape(-1, 2)
             return np.concatenate([points, points], axis=1)
         case _:
-            raise UnsupportedError(f"the distance from a random point to a {type(region).__name__}")
+            raise CannotEvaluate(f"the distance from a random point to a {type(region).__name__}")
 
 
 def distance_term(region: Region, point: TermVector, around: Box) -> tuple[Term, list[tuple[Formula, Term]]]:
@@ -126,14 +127,14 @@ def distance_term(region: Region, point: TermVector, around: Box) -> tuple[Term,
         around: Where the point can be; what is never nearest from there is left out.
 
     Raises:
-        UnsupportedError: The region has no segments, or too many of them.
+        CannotEvaluate: The region has no segments, or too many of them.
     """
     if isinstance(region, Disc):
         away = length(minus(point, (number(region.center[0]), number(region.center[1]))))
         return apply(ArithmeticOp.MAX, apply(ArithmeticOp.SUB, away, region.radius), 0.0), []
     segments = _nearest_only(_points(region), around)
     if not len(segments) or len(segments) > LIMITS.distance_edges:
-        raise UnsupportedError("the distance from a random point to a region of so many edges")
+        raise CannotEvaluate("the distance from a random point to a region of so many edges")
     outside = apply(ArithmeticOp.MIN, *(_to_segment(point, segment) for segment in segments.tolist()))
     if not isinstance(region, PolygonSet | Rectangle):
         return outside, []
@@ -201,7 +202,7 @@ def box_meets(box: BoxTerms, region: Region) -> Formula:
         region: Polygons, a rectangle, a disc, or a union of these.
 
     Raises:
-        UnsupportedError: The region is of another kind.
+        CannotEvaluate: The region is of another kind.
     """
     match region:
         case Rectangle():
@@ -212,12 +213,12 @@ def box_meets(box: BoxTerms, region: Region) -> Formula:
         case PolygonSet():
             cells = convex_cells(region, region_bounds(region))
             if len(cells) > LIMITS.distance_edges:
-                raise UnsupportedError("whether a random box meets a region of so many pieces")
+                raise CannotEvaluate("whether a random box meets a region of so many pieces")
             return disjunction(_box_meets_cell(box, cell) for cell in cells)
         case UnionOf():
             return disjunction(box_meets(box, part) for part in region.parts)
         case _:
-            raise UnsupportedError(f"whether a random box meets a {type(region).__name__}")
+            raise CannotEvaluate(f"whether a random box meets a {type(region).__name__}")
 
 
 def _box_meets_cell(box: BoxTerms, cell: np.ndarray) -> Formula:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 
+from scenicq.errors import CannotEvaluate
 from scenicq.forest.bounds import Box
 from scenicq.forest.nodes import ArithmeticOp
 from scenicq.geometry import shapes
@@ -19,7 +20,7 @@ from scenicq.geometry.terms import overlap, rectangle_shape
 from scenicq.limits import LIMITS
 from scenicq.smt.distance_terms import BoxTerms, dot, minus
 from scenicq.smt.problem import Formula
-from scenicq.smt.region_membership import UnsupportedError, convex_cell, disc
+from scenicq.smt.region_membership import convex_cell, disc
 from scenicq.smt.terms import FALSE, TRUE, apply, compare, conjunction, disjunction, number
 
 __all__ = ["box_holds"]
@@ -34,7 +35,7 @@ def box_holds(box: BoxTerms, region: Region, around: Box) -> Formula:
         around: Where the box's corners can be; the region's border elsewhere is left out.
 
     Raises:
-        UnsupportedError: The region is of another kind, or its border has too many edges there.
+        CannotEvaluate: The region is of another kind, or its border has too many edges there.
     """
     match region:
         case Everywhere():
@@ -55,7 +56,7 @@ def box_holds(box: BoxTerms, region: Region, around: Box) -> Formula:
         case IntersectionOf():
             return conjunction(box_holds(box, part, around) for part in region.parts)
         case _:
-            raise UnsupportedError(f"whether a random box lies in a {type(region).__name__}")
+            raise CannotEvaluate(f"whether a random box lies in a {type(region).__name__}")
 
 
 def _near(regions: list[PolygonSet], around: Box) -> Shape:
@@ -81,7 +82,7 @@ def _area_holds(box: BoxTerms, area: Shape, around: Box) -> Formula:
         if min(ax, bx) <= x1 and max(ax, bx) >= x0 and min(ay, by) <= y1 and max(ay, by) >= y0
     ]
     if len(close) > LIMITS.enclosing_edges:
-        raise UnsupportedError("whether a random box lies in a region of so many edges")
+        raise CannotEvaluate("whether a random box lies in a region of so many edges")
     inside = disjunction(convex_cell(box.center, cell) for cell in cells)
     return conjunction([inside, *(_missed(box, *edge) for edge in close)])
 

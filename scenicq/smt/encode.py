@@ -21,7 +21,7 @@ from scenicq.forest.nodes import (
 )
 from scenicq.smt.expressions import Expressions
 from scenicq.smt.problem import Formula, Problem, Term, Variable, is_term
-from scenicq.smt.region_membership import TermVector, UnsupportedError, disc
+from scenicq.smt.region_membership import TermVector, disc
 from scenicq.smt.terms import FALSE, apply, compare, conjunction, disjunction
 from scenicq.smt.unknowns import Unknowns
 from scenicq.smt.value_codes import (
@@ -30,7 +30,7 @@ from scenicq.smt.value_codes import (
     truth,
 )
 
-__all__ = ["Encoding", "Item", "Target", "UnsupportedError", "encode"]
+__all__ = ["Encoding", "Item", "Target", "encode"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +85,7 @@ def encode(groups: Sequence[Sequence[Item]], *, borders: bool = True) -> Encodin
             is smaller and has more solutions: if it has none, there is none, but a solution may be none.
 
     Raises:
-        UnsupportedError: A construct has no formula.
+        CannotEvaluate: A construct has no formula.
     """
     unknowns = Unknowns()
     parts = [_group(items, unknowns, borders=borders) for items in groups]

@@ -10,6 +10,7 @@ import math
 from collections.abc import Mapping
 from typing import cast
 
+from scenicq.errors import CannotEvaluate
 from scenicq.forest.bounds import Box, scalar_bounds, vector_bounds
 from scenicq.forest.nodes import (
     AheadInLanes,
@@ -62,7 +63,7 @@ from scenicq.smt.distance_terms import BoxTerms, box_meets, boxes_meet, disc_mee
 from scenicq.smt.enclosing import box_holds
 from scenicq.smt.field import field_cells
 from scenicq.smt.problem import Formula, Term, is_formula, is_term
-from scenicq.smt.region_membership import TermVector, UnsupportedError, inside_region, picked
+from scenicq.smt.region_membership import TermVector, inside_region, picked
 from scenicq.smt.terms import FALSE, apply, compare, conjunction, disjunction, negation, number
 from scenicq.smt.unknowns import Unknowns
 from scenicq.smt.value_codes import (
@@ -101,7 +102,7 @@ class Expressions:
         """The code of a node.
 
         Raises:
-            UnsupportedError: A construct has no formula.
+            CannotEvaluate: A construct has no formula.
         """
         self._keep.append(root)
         for node in postorder((root,)):
@@ -118,7 +119,7 @@ class Expressions:
             case Constant():
                 return constant_code(node.value)
             case Feature():
-                raise UnsupportedError("a feature that was not conditioned")
+                raise CannotEvaluate("a feature that was not conditioned")
             case Range() | Normal() | TruncatedNormal() | DiscreteRange() | Index():
                 return self.unknowns.number(node, terms)
             case PointIn():
@@ -149,9 +150,9 @@ class Expressions:
                 x, y = cast(TermVector, args[0])
                 return apply(ArithmeticOp.ATAN2, apply(ArithmeticOp.NEG, x), y)
             case CourseCoordinate() | Measure() | LaneCourse() | Corridor() | AheadInLanes():
-                raise UnsupportedError("a course that hangs on what no label shows")
+                raise CannotEvaluate("a course that hangs on what no label shows")
             case Among():
-                raise UnsupportedError("a condition on other label objects that hangs on what no label shows")
+                raise CannotEvaluate("a condition on other label objects that hangs on what no label shows")
             case DirectionAt():
                 return self._direction(node, cast(TermVector, args[1]))
             case Compare():
@@ -245,7 +246,7 @@ class Expressions:
         if len(boxes) == 2:
             return boxes_meet(self._frame(boxes[0]), self._frame(boxes[1]))
         if not boxes:
-            raise UnsupportedError("whether two random regions meet")
+            raise CannotEvaluate("whether two random regions meet")
         other = node.right if boxes[0] is node.left else node.left
         return box_meets(self._frame(boxes[0]), known_region(other))
 
@@ -277,7 +278,7 @@ class Expressions:
                     number(box.length),
                 )
             case _:
-                raise UnsupportedError("whether a random region lies in another")
+                raise CannotEvaluate("whether a random region lies in another")
 
     def _arithmetic(self, node: Arithmetic, args: list[Term]) -> Term:
         op = node.op
@@ -294,7 +295,7 @@ class Expressions:
         whole = self._floored(node, args)
         if whole is not None:
             return whole
-        raise UnsupportedError(f"`{op.value}` of random values")
+        raise CannotEvaluate(f"`{op.value}` of random values")
 
     def _floored(self, node: Arithmetic, args: list[Term]) -> Term | None:
         """Rounding down or up, division and remainder by it: one case for each whole number within the bounds."""
@@ -351,10 +352,10 @@ class Expressions:
             )
             return cast(Term, self.code(Select(node.field.index, options, span=node.span)))
         if not isinstance(node.field, Constant):
-            raise UnsupportedError("a random vector field at a random point")
+            raise CannotEvaluate("a random vector field at a random point")
         (x0, x1), (y0, y1) = self._around(node.point)
         if not all(map(math.isfinite, (x0, x1, y0, y1))):
-            raise UnsupportedError("the direction of a field at an unbounded point")
+            raise CannotEvaluate("the direction of a field at an unbounded point")
         heading = self.unknowns.fresh("heading", -math.pi, math.pi)
         cells = field_cells(cast(VectorField, node.field.value), point, (x0, y0, x1, y1), borders=self._borders)
         self.unknowns.side.append(

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, TypeAlias, TypeGuard, cast
+from typing import Any, TypeGuard, cast
 
 from scenicq.forest.nodes import (
     Arithmetic,
@@ -29,8 +29,8 @@ from scenicq.forest.walk import children, postorder
 
 __all__ = ["Formula", "Problem", "Term", "Variable", "holds", "is_formula", "is_term"]
 
-Term: TypeAlias = Constant | Range | Arithmetic
-Formula: TypeAlias = Constant | Compare | Logic
+Term = Constant | Range | Arithmetic
+Formula = Constant | Compare | Logic
 
 
 def is_term(code: object) -> TypeGuard[Term]:

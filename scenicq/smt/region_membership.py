@@ -8,6 +8,7 @@ from typing import TypeAlias, cast
 
 import numpy as np
 
+from scenicq.errors import CannotEvaluate
 from scenicq.forest.bounds import Box
 from scenicq.forest.nodes import (
     ArithmeticOp,
@@ -43,13 +44,9 @@ from scenicq.geometry.shapes import Bounds
 from scenicq.smt.problem import Formula, Term, is_formula
 from scenicq.smt.terms import FALSE, TRUE, apply, compare, conjunction, disjunction, negation
 
-__all__ = ["TermVector", "UnsupportedError", "convex_cell", "disc", "inside_region", "picked"]
+__all__ = ["TermVector", "convex_cell", "disc", "inside_region", "picked"]
 
 TermVector: TypeAlias = tuple[Term, Term]
-
-
-class UnsupportedError(Exception):
-    """A construct that has no formula; the message says which."""
 
 
 def picked(index: Term | Formula, number: int) -> Formula:
@@ -195,7 +192,7 @@ def inside_region(region: Node, point: TermVector, around: Box, code: Callable[[
         code: Gives the term of a subexpression.
 
     Raises:
-        UnsupportedError: The region is a sector of random angle.
+        CannotEvaluate: The region is a sector of random angle.
     """
     known: dict[int, Formula] = {}
     todo = [region]
@@ -237,7 +234,7 @@ def _inside(
             return disc(*_offset(point, cast(TermVector, code(region.center))), cast(Term, code(region.radius)))
         case SectorAt():
             if not isinstance(region.angle, Constant):
-                raise UnsupportedError("a view of random angle")
+                raise CannotEvaluate("a view of random angle")
             offset = _offset(point, cast(TermVector, code(region.center)))
             radius, heading = cast(Term, code(region.radius)), cast(Term, code(region.heading))
             return _sector(*offset, radius, heading, cast(float, region.angle.value))
@@ -256,4 +253,4 @@ def _inside(
             index = cast("Term | Formula", code(region.index))
             return disjunction(conjunction([picked(index, number), part]) for number, part in enumerate(parts))
         case _:
-            raise UnsupportedError(f"a region given as {type(region).__name__}")
+            raise CannotEvaluate(f"a region given as {type(region).__name__}")

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
+from scenicq.errors import CannotEvaluate
 from scenicq.forest.bounds import scalar_bounds
 from scenicq.forest.nodes import ArithmeticOp, Constant, DiscreteRange, Identity, Index, Normal, Range, TruncatedNormal
 from scenicq.limits import LIMITS
 from scenicq.smt.problem import Formula, Term, Variable
-from scenicq.smt.region_membership import UnsupportedError
 from scenicq.smt.terms import apply, compare, disjunction
 
 __all__ = ["ScalarLeaf", "Unknowns"]
@@ -50,7 +50,7 @@ class Unknowns:
             args: Codes of the parameters of its distribution.
 
         Raises:
-            UnsupportedError: It is a whole number out of too many, or out of a random range.
+            CannotEvaluate: It is a whole number out of too many, or out of a random range.
         """
         if node.identity in self.made:
             return self.made[node.identity][0].leaf
@@ -66,7 +66,7 @@ class Unknowns:
                 self.side += [compare("<=", args[2], variable), compare("<=", variable, args[3])]
             case DiscreteRange() | Index():
                 if not math.isfinite(high - low) or high - low > LIMITS.integer_values:
-                    raise UnsupportedError("an integer from a random or very long range")
+                    raise CannotEvaluate("an integer from a random or very long range")
                 numbers = range(math.ceil(low), math.floor(high) + 1)
                 self.whole.add(node.identity)
                 self.side.append(disjunction(compare("==", variable, float(n)) for n in numbers))

@@ -10,10 +10,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import cast
 
+from scenicq.errors import CannotEvaluate
 from scenicq.forest.nodes import ArithmeticOp, CompareOp, Constant, LogicOp, Node, RectangleAt, Undefined, Value
 from scenicq.geometry.regions import Rectangle, Region
 from scenicq.smt.problem import Formula, Term, is_formula, is_term
-from scenicq.smt.region_membership import TermVector, UnsupportedError, picked
+from scenicq.smt.region_membership import TermVector, picked
 from scenicq.smt.terms import FALSE, TRUE, apply, compare, conjunction, disjunction, negation, number
 
 __all__ = [
@@ -63,10 +64,10 @@ def known_region(node: Node) -> Region:
     """The region that an expression is, if it is known.
 
     Raises:
-        UnsupportedError: It is random.
+        CannotEvaluate: It is random.
     """
     if not isinstance(node, Constant):
-        raise UnsupportedError("a measure of a region that is random itself")
+        raise CannotEvaluate("a measure of a region that is random itself")
     return cast(Region, node.value)
 
 

@@ -11,7 +11,7 @@ from left_to_solvers import leave_to_solvers
 from programs import HEADER, PROGRAMS
 from scenes import compiled, drawn, label_of
 
-from scenicq.forest.compute import CannotEvaluate
+from scenicq.errors import CannotEvaluate
 from scenicq.forest.scenario import BuiltIn
 from scenicq.match.decide import solver_step
 from scenicq.match.linear import linear_program

@@ -28,7 +28,7 @@ from patchwork import SIDE, Beside, patchwork
 from programs import HEADER, PROGRAMS
 
 from scenicq.compiler.program import compile_scenario
-from scenicq.errors import Source
+from scenicq.errors import CannotEvaluate, Source
 from scenicq.forest.nodes import ArithmeticOp, Constant, DirectionAt, LogicOp
 from scenicq.forest.show_modes import show_modes
 from scenicq.geometry.default_street import street
@@ -57,7 +57,6 @@ from scenicq.smt.command import SmtlibSolver
 from scenicq.smt.distance_terms import BoxTerms
 from scenicq.smt.enclosing import box_holds
 from scenicq.smt.problem import Problem
-from scenicq.smt.region_membership import UnsupportedError
 from scenicq.smt.terms import apply, compare, disjunction, number, parts
 from scenicq.smt.worker_solver import WorkerSolver
 from scenicq.store.dataset import Dataset, open_dataset
@@ -318,7 +317,7 @@ def held_box(stores: Stores, **_: object) -> Facts:
     )
     try:
         formula = box_holds(terms, region, ((0.0, 9.0), (2.0, 2.0)))
-    except UnsupportedError:
+    except CannotEvaluate:
         return fact(NoAnswer("unsupported"))
     return fact(built_in.check(Problem((X,), formula), precision=1e-3, timeout_s=5.0))
 
