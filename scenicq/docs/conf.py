@@ -48,7 +48,7 @@ CONTENTS = {
     ],
     "Reference": [
         "scenicq/docs/api",
-        "scenicq/docs/codes",
+        "scenicq/codes",
         "scenicq/importers/README",
         "scenicq/limits",
         "scenicq/evaluate/README",

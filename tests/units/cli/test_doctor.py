@@ -5,6 +5,7 @@ import json
 import pytest
 
 import scenicq_cli.doctor
+from scenicq import __version__
 from scenicq.smt.answer import SolverStatus
 
 BROKEN = SolverStatus("dreal", ok=False, detail="missing libraries: libibex.so", hint="do this; do that")
@@ -23,7 +24,7 @@ def test_the_portable_solver_loads_here(run):
     status = {solver["name"]: solver["ok"] for solver in content["solvers"]}
     assert status["portable"] is True
     assert "dreal" in status
-    assert content["versions"]["scenicq"] == "0.1.0"
+    assert content["versions"]["scenicq"] == __version__
     assert {"python", "duckdb", "pyarrow", "shapely", "numpy"} <= set(content["versions"])
 
 

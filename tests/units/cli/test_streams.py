@@ -187,6 +187,7 @@ COMMANDS = {
     "show": "show DATASET 03-busy-intersection/10",
     "report": "report out.jsonl out.jsonl",
     "info": "info DATASET --format json",
+    "codes": "codes unknown-name",
     "completion": "completion bash",
     "help": "match --help",
 }
