@@ -58,7 +58,7 @@ class Variable:
     @classmethod
     def of(cls, name: str, low: float, high: float, identity: Identity | None = None) -> Variable:
         """A variable with a closed range, which is a new random number unless it is told which."""
-        ends = Constant(low), Constant(high)
+        ends = Constant(float(low)), Constant(float(high))
         return cls(name, Range(*ends) if identity is None else Range(*ends, identity=identity))
 
     @property
