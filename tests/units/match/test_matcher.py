@@ -321,7 +321,7 @@ def test_what_geometry_cannot_tell_is_unknown(monkeypatch):
 @pytest.mark.usefixtures("no_search")
 def test_a_linear_program_without_an_answer_is_no_proof(monkeypatch):
     def fails(*_):
-        raise linear_program.NotLinear
+        raise linear_program.not_linear()
 
     monkeypatch.setattr(linear_program, "_solve", fails)
     scenario = compiled(HEADER + PROGRAMS["shared"])
