@@ -41,21 +41,21 @@ def apply(op: ArithmeticOp, *arguments: Term | float) -> Term:
     Folding computes in binary64, one rounding for each application. What is undefined stays unfolded.
     """
     args = [number(each) if isinstance(each, int | float) else each for each in arguments]
-    if op in _COMMUTE:
-        args.sort(key=lambda arg: isinstance(arg, Constant))
+    known = [arg for arg in args if isinstance(arg, Constant)]
     if len(args) > 2:
-        known = [arg for arg in args if isinstance(arg, Constant)]
         others = [arg for arg in args if not isinstance(arg, Constant)]
         return _apply_in_turn(op, [*others, _apply_in_turn(op, known)] if known and others else args)
-    numbers = [cast(float, arg.value) for arg in args if isinstance(arg, Constant)]
-    if len(numbers) == len(args):
-        value = arithmetic(op, numbers)
+    if len(known) == len(args):
+        value = arithmetic(op, [cast(float, arg.value) for arg in known])
         return Constant(value) if isinstance(value, float) else Arithmetic(op, tuple(args))
+    if known and op in _COMMUTE:
+        args.sort(key=lambda arg: isinstance(arg, Constant))
     first, last = args[0], args[-1]
-    if isinstance(last, Constant) and last.value == _NEUTRAL.get(op):
-        return first
-    if op is ArithmeticOp.MUL and isinstance(last, Constant) and last.value == 0 and isinstance(first, Range):
-        return Constant(0.0)
+    if known and last is known[0]:
+        if last.value == _NEUTRAL.get(op):
+            return first
+        if op is ArithmeticOp.MUL and last.value == 0 and isinstance(first, Range):
+            return Constant(0.0)
     if op is ArithmeticOp.NEG and isinstance(last, Arithmetic) and last.op is ArithmeticOp.NEG:
         return cast(Term, last.args[0])
     return first if op in _FOLDED and len(args) == 1 else Arithmetic(op, tuple(args))
