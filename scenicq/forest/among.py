@@ -14,9 +14,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from scenicq.errors import CannotEvaluate
 from scenicq.forest.column_domain import ColumnDomain, first_direction
 from scenicq.forest.columns import DEFINED, UNDEFINED, UNKNOWN, Array, Coded, Column, Data, Placed, truth_of
-from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.interpret import Steps, interpret, steps_of
 from scenicq.forest.nodes import ELEMENT, RANK, Among, AmongOp, Body, Feature, Leaf, Node
 from scenicq.forest.scenario import Scenario

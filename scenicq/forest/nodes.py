@@ -15,14 +15,16 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import StrEnum
 from itertools import count
-from typing import ClassVar, Literal, TypeAlias
+from typing import TYPE_CHECKING, ClassVar, Literal, TypeAlias
 
 from scenicq.errors import Span
-from scenicq.geometry.driven_courses import CoursePlace
-from scenicq.geometry.fields import VectorField
-from scenicq.geometry.measures import MeasureName
-from scenicq.geometry.network import Network
-from scenicq.geometry.regions import Region
+
+if TYPE_CHECKING:  # takes long to load, and whoever asks a solver about numbers needs none of it
+    from scenicq.geometry.driven_courses import CoursePlace
+    from scenicq.geometry.fields import VectorField
+    from scenicq.geometry.measures import MeasureName
+    from scenicq.geometry.network import Network
+    from scenicq.geometry.regions import Region
 
 __all__ = [
     "CLOCK", "COURSE", "ELEMENT", "GIVEN", "GOING", "IDENTITY", "LAST_LANE", "MIRRORED", "PAST", "RANK", "TRACK", "WHO",
@@ -49,7 +51,7 @@ class Undefined:
     reason: str
 
 
-Value: TypeAlias = float | bool | str | Vector | Region | VectorField | CoursePlace | Undefined | None
+Value: TypeAlias = "float | bool | str | Vector | Region | VectorField | CoursePlace | Undefined | None"
 
 COURSE = "driven course"
 """The property of an object that is its course; no program can give one of such a name."""

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.budget import look
-from scenicq.forest.compute import CannotEvaluate
+from scenicq.errors import CannotEvaluate
 from scenicq.forest.groups import PARAMS, Condition
 from scenicq.forest.nodes import Value
 from scenicq.forest.scenario import Requirement

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.budget import look
-from scenicq.forest.compute import CannotEvaluate
+from scenicq.errors import CannotEvaluate
 from scenicq.forest.groups import Constraint
 from scenicq.forest.nodes import COURSE, GOING, LAST_LANE, Identity, LaneCourse, Leaf, Value
 from scenicq.forest.scenario import Scenario

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.budget import look
+from scenicq.errors import CannotEvaluate
 from scenicq.forest.columns import DEFINED, UNDEFINED, value_reader
-from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.kinds import kind_of
 from scenicq.forest.nodes import Identity, Kind, Node, Value
 from scenicq.forest.scenario import RecordedValue, Scenario
