@@ -11,6 +11,8 @@ from typing import Any, cast
 
 from scenicq import __version__
 from scenicq.match.tolerance import Tolerance
+from scenicq.option_values import Amount, OptionKind
+from scenicq.query.execution.option_texts import QUERY_OPTIONS
 from scenicq.query.execution.results import Funnel
 from scenicq.query.execution.run import Query
 from scenicq.report.frames import table
@@ -22,9 +24,8 @@ __all__ = ["funnel_section", "how_section", "program_section", "versions"]
 _PACKAGES = ("duckdb", "numpy", "pyarrow", "shapely", "highspy", "dreal")
 
 
-_NAMES = {"version": "scenic", "every": "all", "timeout_s": "timeout"}
-"""Options that the command line calls otherwise."""
-_UNITS = {"radius": "m", "timeout_s": "s"}
+_OPTIONS = {option.field: (name, option) for name, option in QUERY_OPTIONS.items()}
+"""The options that people write, with their names, by where their values are."""
 
 
 def _bar(share: float, told: str) -> str:
@@ -151,19 +152,20 @@ def _flat(value: Any, name: str = "") -> list[tuple[str, str]]:
             for each in fields(value)
             for row in _flat(getattr(value, each.name), f"{name}.{each.name}" if name else each.name)
         ]
-    name = name.removeprefix("match.")
-    return [(_NAMES.get(name, name.replace("_", "-")), _shown(name, value))]
+    written, option = _OPTIONS.get(name, (name.rpartition(".")[2], None))
+    flag = option.flags[-1].removeprefix("--") if option is not None and option.flags else written.replace("_", "-")
+    return [(flag, _shown(value, option.kind if option is not None else None))]
 
 
-def _shown(name: str, value: Any) -> str:
+def _shown(value: Any, kind: OptionKind | None) -> str:
     """An option's value as a person would give it."""
     match value:
         case None:
             return "not given"
         case bool():
             return "yes" if value else "no"
-        case float() if name in _UNITS:
-            return f"{value:g} {_UNITS[name]}"
+        case float() if isinstance(kind, Amount) and kind.unit:
+            return f"{value:g} {kind.unit}"
         case frozenset():
             return ", ".join(sorted(map(str, cast("frozenset[Any]", value)))) or "none"
         case _:
