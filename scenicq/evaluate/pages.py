@@ -12,7 +12,7 @@ from scenicq.errors import Diagnostic
 from scenicq.evaluate.comparison import Share
 from scenicq.evaluate.detection import Detection
 from scenicq.evaluate.evaluation import Evaluation, ModelsEvaluation, ScenarioEvaluation, WorstFrame
-from scenicq.evaluate.rows import Table, balance_table, frame_counts, models_table, overview, tables
+from scenicq.evaluate.rows import Table, balance_table, frame_counts, models_table, overview, tables, worst_table
 from scenicq.geometry.boxes import corners
 from scenicq.geometry.camera import box_corners, box_edges
 from scenicq.report.backdrop import Backdrop
@@ -78,15 +78,18 @@ def _cell(text: str) -> str:
     return escape(text).replace(" %", "\u00a0%").replace(", ", ",\u00a0").replace("&lt; ", "&lt;\u00a0")
 
 
-def _table(shown: Table, graphs: Sequence[str] = ()) -> str:
+def _table(shown: Table, graphs: Sequence[str] = (), links: Sequence[str] = ()) -> str:
     """A table of texts.
 
     Args:
         shown: The table.
         graphs: A last cell of each row; none of them where there are none.
+        links: The anchor that the first cell of each row leads to, where there are any.
     """
     title, head, rows = shown
     cells = [[*map(_cell, row), *graphs[number : number + 1]] for number, row in enumerate(rows)]
+    for row, anchor in zip(cells, links, strict=False):
+        row[0] = element("a", row[0], href=f"#{anchor}")
     names = [name.lower() for name in head] + ["0 to 100 %"] * bool(graphs)
     return table(title[:1].upper() + title[1:], names, cells)
 
@@ -183,13 +186,9 @@ class _Model:
 
     def _overview(self) -> str:
         """All scenarios in one table, with links to each."""
-        title, head, rows = overview(self._evaluation)
+        shown = overview(self._evaluation)
         place = {each.name: number for number, each in enumerate(self._evaluation.scenarios)}
-        cells = [
-            [element("a", escape(row[0]), href=f"#{self._section(place[row[0]])}"), *map(_cell, row[1:])]
-            for row in rows
-        ]
-        return table(title.capitalize(), [name.lower() for name in head], cells)
+        return _table(shown, links=[self._section(place[row[0]]) for row in shown[2]])
 
     def _scenario(self, each: ScenarioEvaluation) -> Iterator[str]:
         counts = frame_counts(each)
@@ -209,17 +208,8 @@ class _Model:
         }
         parts += [_table(shown, graphs.get(shown[0], ())) for shown in tables(each, self._evaluation.within)]
         worst = each.worst[:SHOWN]
-        links = [
-            (
-                element("a", escape(one.frame), href=f"#{self._anchor(each, one)}"),
-                escape(one.recording),
-                f"{one.missed} of {one.of}",
-                f"{one.false}",
-            )
-            for one in worst
-        ]
         parts.append(element("p", escape(_SIGNS), class_="hint"))
-        parts.append(table("Worst frames", ("frame", "recording", "missed", "false boxes"), links))
+        parts.append(_table(worst_table(each, SHOWN), links=[self._anchor(each, one) for one in worst]))
         yield element("section", *parts, id=self._section(self._evaluation.scenarios.index(each)))
         for one in worst:
             yield self._frame(each, one)
