@@ -230,9 +230,7 @@ def changes_page(found: Sequence[FrameChange], names: tuple[str, str], doubts: S
         doubts: What the reader should know of them.
     """
     counts = [(f"{_MARKS[kind]}\N{NO-BREAK SPACE}{kind}", _TOLD[kind], f"{count:,}") for kind, count in _counts(found)]
-    groups: list[tuple[Kind, list[FrameChange]]] = [
-        (kind, [change for change in found if change.kind == kind]) for kind in _TOLD
-    ]
+    of_kind: dict[Kind, list[FrameChange]] = {kind: [each for each in found if each.kind == kind] for kind in _TOLD}
     body = markup(
         "changes", "body", names=list(zip("AB", names, strict=True)), counts=counts,
         doubts=["; ".join((each.message, *each.hints)) for each in doubts],
