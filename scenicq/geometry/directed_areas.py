@@ -18,6 +18,7 @@ from scenicq.geometry.cell_guards import segment_distances
 from scenicq.geometry.fields import FieldCell
 from scenicq.geometry.road_cells import Outline, convex_outlines, segment_cells
 from scenicq.geometry.shapes import Bounds, Coordinates, Shape
+from scenicq.number_ranges import expand_ranges
 
 __all__ = ["ONE_HEADING", "TIE", "AreaPairs", "DirectedAreas", "DirectedLane", "distinct_pairs"]
 
@@ -158,7 +159,7 @@ class DirectedAreas:
         point, area = pairs
         counts = starts[area + 1] - starts[area]
         pair = np.repeat(np.arange(len(area)), counts)
-        segment = np.arange(len(pair)) - np.repeat(np.cumsum(counts) - counts, counts) + starts[area][pair]
+        segment = expand_ranges(starts[area], counts)
         away = segment_distances(xy[point[pair]], segments[segment])
         best = np.full(len(area), np.inf)
         np.minimum.at(best, pair, away)
