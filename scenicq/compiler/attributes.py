@@ -21,6 +21,7 @@ from scenicq.forest import build
 from scenicq.forest.angle_wrap import one_turn
 from scenicq.forest.kinds import kind_of
 from scenicq.forest.nodes import ArithmeticOp, Node
+from scenicq.geometry.abstract_map import AbstractElement, NeedsMapError
 from scenicq.geometry.elements import Maneuver, NetworkElement, Signal
 from scenicq.geometry.network import Network
 from scenicq.limits import LIMITS
@@ -109,6 +110,8 @@ def _names(value: ModelValue) -> set[str]:
 
 def _lookup(run: Interpreter, value: ModelValue, name: str, span: Span) -> ModelValue:
     match value:
+        case AbstractElement():
+            raise NeedsMapError
         case Instance():
             return _of_instance(run, value, name, span)
         case Module():
