@@ -25,13 +25,13 @@ from scenicq.geometry.network import Network
 from scenicq.geometry.regions import Region
 
 __all__ = [
-    "CLOCK", "COURSE", "ELEMENT", "GIVEN", "GOING", "IDENTITY", "LAST_LANE", "MIRRORED", "OPEN", "PAST", "RANK", "TRACK",
-    "WHO", "AheadInLanes", "Among", "AmongOp", "Arithmetic", "ArithmeticOp", "Bearing", "Body", "Compare", "CompareOp",
-    "Constant", "Contains", "Coordinate", "Corridor", "CourseCoordinate", "DirectionAt", "DiscAt", "DiscreteRange",
-    "Distance", "Encloses", "Feature", "Identity", "Index", "Intersects", "Kind", "LaneCourse", "Leaf", "Logic",
-    "LogicOp", "Measure", "Node", "Norm", "Normal", "PointIn", "Range", "RectangleAt", "RegionDifference",
-    "RegionIntersection", "RegionUnion", "Rotate", "Scale", "SectorAt", "Select", "TruncatedNormal", "Undefined",
-    "Value", "Vector", "VectorOf", "VectorSum",
+    "CLOCK", "COURSE", "ELEMENT", "GIVEN", "GOING", "IDENTITY", "LAST_LANE", "MIRRORED", "OPEN", "PAST", "RANK",
+    "TRACK", "WHO", "AheadInLanes", "Among", "AmongOp", "Arithmetic", "ArithmeticOp", "Bearing", "Body", "Compare",
+    "CompareOp", "Constant", "Contains", "Coordinate", "Corridor", "CourseCoordinate", "DirectionAt", "DiscAt",
+    "DiscreteRange", "Distance", "Encloses", "Feature", "Identity", "Index", "Intersects", "Kind", "LaneCourse",
+    "Leaf", "Logic", "LogicOp", "Measure", "Node", "Norm", "Normal", "PointIn", "Range", "RectangleAt",
+    "RegionDifference", "RegionIntersection", "RegionUnion", "Rotate", "Scale", "SectorAt", "Select",
+    "TruncatedNormal", "Undefined", "Value", "Vector", "VectorOf", "VectorSum",
 ]  # fmt: skip
 
 Vector: TypeAlias = tuple[float, float]

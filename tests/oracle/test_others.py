@@ -1,7 +1,7 @@
 """`others`, `count` and `nearest` by plain enumeration, sharing no code: random programs over frames and over time.
 
 The heading, the velocity, an attribute or the class of some label objects is not known as far as a program asks for it.
-What is expected follows Kleene's logic; where that leaves something unknown and the tool tells more, fillings must agree.
+What is expected follows Kleene's logic; where that leaves something unknown and the tool tells more, fillings agree.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Attributes that labels have and the program does not give its objects: what is read, and what is said where none is."""
+"""Attributes that labels have and the program does not give its objects: what is read, and what is said of none."""
 
 from __future__ import annotations
 
