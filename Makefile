@@ -7,7 +7,7 @@ BIN := .venv/bin
 READY := .venv/.ready
 PYTEST := $(BIN)/python -m pytest -q -p no:cacheprovider --dist worksteal
 LINTED := scenicq cli tests sample_data
-FASTEST := tests/syntax tests/forest tests/compiler tests/test_language.py tests/test_layers.py tests/match/search/test_backtracking.py
+FASTEST := tests/units/syntax tests/units/forest tests/units/compiler tests/test_language.py tests/test_layers.py tests/units/match/search/test_backtracking.py
 
 # The tests start hundreds of processes: without bytecode each compiles 300 files of ours, which takes 0.7 s.
 unexport PYTHONDONTWRITEBYTECODE
@@ -50,42 +50,42 @@ test: $(READY) ## All tests but the slow ones
 test-all: $(READY) ## All tests
 	$(BIN)/python -m pip install -qq --disable-pip-version-check --editable '.[dev,notebook]'
 	$(PYTEST) -n $(WORKERS) --hypothesis-profile=anew
-	$(BIN)/python tests/dependencies/versions.py oldest
-	$(BIN)/python tests/dependencies/versions.py newest --pre
+	$(BIN)/python tests/tools/dependencies/versions.py oldest
+	$(BIN)/python tests/tools/dependencies/versions.py newest --pre
 
 test-versions: $(READY) ## What test-oldest and test-newest do, side by side
-	$(BIN)/python tests/dependencies/versions.py oldest newest
+	$(BIN)/python tests/tools/dependencies/versions.py oldest newest
 
 test-oldest: $(READY) ## The lowest versions of dependencies that pyproject.toml allows, without pandas: the same output
-	$(BIN)/python tests/dependencies/versions.py oldest
+	$(BIN)/python tests/tools/dependencies/versions.py oldest
 
 test-newest: $(READY) ## The newest versions of dependencies, without pandas: the same output
-	$(BIN)/python tests/dependencies/versions.py newest
+	$(BIN)/python tests/tools/dependencies/versions.py newest
 
 golden: $(READY) ## Rewrite the golden files that tests compare with
 	$(PYTEST) --update-golden -m 'not slow'
 
 bench: $(READY) ## Measure queries, start-up, ingest, pictures and what each step of matching is worth; numbers go to bench-results/ (SCENIC=a checkout and DATASETS= add its programs)
-	$(BIN)/python tests/bench/queries.py
-	$(BIN)/python tests/bench/jointly.py
-	$(BIN)/python tests/bench/scalability.py --patience 5
-	$(BIN)/python tests/bench/ingest.py
-	$(BIN)/python tests/bench/pictures.py
-	$(BIN)/python tests/bench/evaluation.py
-	$(BIN)/python tests/bench/planted.py --page
-	$(BIN)/python tests/bench/steps.py
-	$(BIN)/python tests/bench/by_hand.py
-	$(BIN)/python tests/bench/maps.py
-	$(BIN)/python tests/bench/intervals_by_hand.py
-	$(BIN)/python tests/bench/intervals.py
-	$(BIN)/python tests/bench/verdicts.py record bench-results/verdicts.jsonl
+	$(BIN)/python tests/tools/bench/queries.py
+	$(BIN)/python tests/tools/bench/jointly.py
+	$(BIN)/python tests/tools/bench/scalability.py --patience 5
+	$(BIN)/python tests/tools/bench/ingest.py
+	$(BIN)/python tests/tools/bench/pictures.py
+	$(BIN)/python tests/tools/bench/evaluation.py
+	$(BIN)/python tests/tools/bench/planted.py --page
+	$(BIN)/python tests/tools/bench/steps.py
+	$(BIN)/python tests/tools/bench/by_hand.py
+	$(BIN)/python tests/tools/bench/maps.py
+	$(BIN)/python tests/tools/bench/intervals_by_hand.py
+	$(BIN)/python tests/tools/bench/intervals.py
+	$(BIN)/python tests/tools/bench/verdicts.py record bench-results/verdicts.jsonl
 ifdef SCENIC
-	$(BIN)/python tests/bench/published.py $(SCENIC) $(DATASETS)
+	$(BIN)/python tests/tools/bench/published.py $(SCENIC) $(DATASETS)
 endif
 
 FRAMES ?= 10000 100000
 bench-scale: $(READY) ## Measure queries over stores of growing size (FRAMES=1000000 is the largest bar)
-	$(BIN)/python tests/bench/scale.py --frames $(FRAMES)
+	$(BIN)/python tests/tools/bench/scale.py --frames $(FRAMES)
 
 MAP ?= Town01.xodr
 RANDOM ?= 200
@@ -94,38 +94,38 @@ ONE = $(or $(SEED),1)
 FRESH := $(or $(SEED),$(shell date +%s))
 conformance: $(READY) ## Compare with Scenic 3.1.1 and 2.1.0 (MAP=an OpenDRIVE file, RANDOM=, SEED=; or SCENIC=a checkout)
 ifdef SCENIC
-	$(BIN)/python tests/conformance/published.py $(SCENIC)
-	$(BIN)/python tests/conformance/map_questions.py $(SCENIC)
+	$(BIN)/python tests/tools/conformance/published.py $(SCENIC)
+	$(BIN)/python tests/tools/conformance/map_questions.py $(SCENIC)
 else
-	$(BIN)/python tests/conformance/run_conformance.py --map $(MAP) --random $(RANDOM) --seed $(ONE)
+	$(BIN)/python tests/tools/conformance/run_conformance.py --map $(MAP) --random $(RANDOM) --seed $(ONE)
 endif
 
 PROGRAMS ?= 3000
 conformance-random: $(READY) ## Match scenes that Scenic 3.1.1 draws from random programs on five towns (MAPS=folders of OpenDRIVE maps, PROGRAMS=, SEED= (a fresh one))
-	$(BIN)/python tests/conformance/random_scenes.py --maps $(MAPS) --programs $(PROGRAMS) --seed $(FRESH)
+	$(BIN)/python tests/tools/conformance/random_scenes.py --maps $(MAPS) --programs $(PROGRAMS) --seed $(FRESH)
 
 TRACES ?= 2
 conformance-time: $(READY) ## Match what Scenic 3.1.1 simulates over time (MAP=an OpenDRIVE file; or SCENIC=a checkout; TRACES= of each program)
-	$(BIN)/python tests/conformance/traces.py $(if $(SCENIC),--checkout $(SCENIC),--map $(MAP)) --seeds $(TRACES)
+	$(BIN)/python tests/tools/conformance/traces.py $(if $(SCENIC),--checkout $(SCENIC),--map $(MAP)) --seeds $(TRACES)
 
 MINUTES ?= 60
 fuzz: $(READY) ## Attack with hostile programs, datasets, sources and kills, MINUTES=60 of each
-	$(BIN)/python tests/fuzz/hostile_programs.py --minutes $(MINUTES) --seed $(ONE)
-	$(BIN)/python tests/fuzz/hostile_datasets.py --minutes $(MINUTES) --seed $(ONE)
-	$(BIN)/python tests/importers/fuzzing/fuzz.py --minutes $(MINUTES) --seed $(ONE)
-	$(BIN)/python tests/fuzz/kills.py --minutes $(MINUTES) --seed $(ONE)
-	$(BIN)/python tests/fuzz/differential.py --minutes $(MINUTES) --seed $(ONE)
+	$(BIN)/python tests/tools/fuzz/hostile_programs.py --minutes $(MINUTES) --seed $(ONE)
+	$(BIN)/python tests/tools/fuzz/hostile_datasets.py --minutes $(MINUTES) --seed $(ONE)
+	$(BIN)/python tests/tools/source_mutations/fuzz.py --minutes $(MINUTES) --seed $(ONE)
+	$(BIN)/python tests/tools/fuzz/kills.py --minutes $(MINUTES) --seed $(ONE)
+	$(BIN)/python tests/tools/fuzz/differential.py --minutes $(MINUTES) --seed $(ONE)
 
 oracle-frames: $(READY) ## Judge random programs over random labels by the definition, MINUTES=60, SEED= (a fresh one)
-	$(BIN)/python tests/oracle/frames_attack.py --minutes $(MINUTES) --seed $(FRESH)
+	$(BIN)/python tests/oracles/labels/frames_attack.py --minutes $(MINUTES) --seed $(FRESH)
 
 oracle-time: $(READY) ## Judge random programs with choices over time by the definition, MINUTES=60, SEED= (a fresh one)
-	$(BIN)/python tests/temporal/test_choices.py --minutes $(MINUTES) --seed $(FRESH)
+	$(BIN)/python tests/oracles/runs/test_choices.py --minutes $(MINUTES) --seed $(FRESH)
 
 MUTATIONS ?= 200
 mutate: $(READY) ## Change the code in MUTATIONS=200 small ways and count which the fast tests notice
 	$(BIN)/python -m pip install -qq --disable-pip-version-check --editable '.[dev,mutation]'
-	$(BIN)/python tests/mutation/mutate.py --count $(MUTATIONS) --seed $(ONE)
+	$(BIN)/python tests/tools/mutation/mutate.py --count $(MUTATIONS) --seed $(ONE)
 
 browser: ## Install the Chromium that the tests of reports are driven in, where the system has it
 	@$(call install_browser)

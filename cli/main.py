@@ -41,6 +41,7 @@ COMMANDS = {
     "info": "Say what a dataset holds and what was left out of it.",
     "index": "Compute anew what a dataset holds beside the labels.",
     "doctor": "Say which solvers load here and what is missing.",
+    "codes": "Say what the code of a message means, and what to do.",
     "completion": "Print what makes a shell complete commands and options.",
 }
 """Every subcommand, each in the module of its name, with the first line of its help."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime, timedelta
@@ -29,6 +30,15 @@ def show(diagnostics: Iterable[Diagnostic]) -> None:
         colour = "red" if diagnostic.severity == "error" else "yellow"
         text = click.style(kind, fg=colour, bold=True) + click.style(colon + message, bold=True)
         click.echo(f"{text}\n{rest}" if rest else text, err=True)
+        _name_page(diagnostic.code)
+
+
+def _name_page(code: str) -> None:
+    """Say to a person, once a command, where a code is explained."""
+    context = click.get_current_context(silent=True)
+    if context is not None and sys.stderr.isatty() and not context.meta.setdefault(_name_page.__qualname__, False):
+        context.meta[_name_page.__qualname__] = True
+        click.echo(click.style(f"(`scenicq codes {code}` says more)", dim=True), err=True)
 
 
 def show_few(diagnostics: Iterable[Diagnostic]) -> None:

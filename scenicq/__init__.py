@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from scenicq.query.execution.run import Query, QueryOptions
     from scenicq.store.dataset import open_dataset
 
-__version__ = "0.1.0"
+__version__ = "1.0.0rc1"
 
 __all__ = [
     "MatchOptions",

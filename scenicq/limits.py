@@ -2,8 +2,8 @@
 
 Whatever may take long, or grow large, ends at a limit that stands here. None of them makes a match a no, or a no a
 match: beyond it an answer is unknown, a program is refused, another way is gone, less is known or people are told less
-(`tests/query/test_every_limit.py`). They are read as plain attributes of `LIMITS`; the time that one label may take is
-in `scenicq.budget`, what users say of both in `scenicq.match.options`.
+(`tests/units/query/test_every_limit.py`). They are read as plain attributes of `LIMITS`; the time that one label may
+take is in `scenicq.budget`, what users say of both in `scenicq.match.options`.
 """
 
 from __future__ import annotations

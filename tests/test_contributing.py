@@ -15,10 +15,10 @@ ROOT = Path(__file__).parents[1]
 FOLDER = ROOT / "scenicq" / "docs" / "changes"
 CHANGES = sorted(FOLDER.glob("*.diff"))
 ALSO = {
-    "importer": ["tests/importers/test_contract.py", "tests/importers/test_registry.py"],
+    "importer": ["tests/contracts/test_importers.py", "tests/units/importers/test_registry.py"],
     "specifier": ["tests/test_language.py"],
     "distribution": ["tests/test_language.py"],
-    "tolerance": ["tests/match/test_tolerance.py"],
+    "tolerance": ["tests/units/match/test_tolerance.py"],
 }
 """Tests of what is around a change, beside those that it brings."""
 pytestmark = pytest.mark.skipif(shutil.which("git") is None, reason="git applies the changes")

@@ -95,27 +95,38 @@ def _class_tree():
 _BLOCK = re.compile(r"^```scenic[^\n]*\n(.*?)^```", re.DOTALL | re.MULTILINE)
 
 
+CODES_PAGE = ROOT / "scenicq" / "codes.md"
+
+
 def _codes():
-    """Each code with its meaning, and the shortest program of the pages of the language that shows it."""
+    """Each code with its meaning, what to do, which the page itself says, and the shortest program that shows it."""
     shown = {}
     for page in sorted((ROOT / "tests" / "language").glob("*.md")):
         for block in _BLOCK.finditer(page.read_text(encoding="utf-8")):
             for code in re.findall(r"# (?:error|warning|note): \[([a-z-]+)\]", block[1]):
                 shown.setdefault(code, []).append((len(block[1]), page.name, block[1]))
+    said = dict(
+        re.findall(r"^## (\S+)\n\n[^\n]*\n\n(What to do: [^\n]*)$", CODES_PAGE.read_text(encoding="utf-8"), re.M)
+    )
     parts = []
     for code, meaning in CODES.items():
-        part = f"## {code}\n\n{meaning[0].upper()}{meaning[1:]}.\n"
+        part = f"## {code}\n\n{meaning[0].upper()}{meaning[1:]}.\n\n{said.get(code, 'What to do:')}\n"
         if code in shown:
             _, name, program = min(shown[code])
-            part += f"\n```scenic\n{program}```\n\nFrom [{name.removesuffix('.md')}](../../tests/language/{name}).\n"
+            part += f"\n```scenic\n{program}```\n\nFrom [{name.removesuffix('.md')}](../tests/language/{name}).\n"
         parts.append(part)
     return "\n".join(parts)
+
+
+def test_each_code_has_a_page_that_says_what_to_do():
+    page = CODES_PAGE.read_text(encoding="utf-8")
+    assert set(re.findall(r"^## (\S+)\n\n[^\n]+\n\nWhat to do: \S[^\n]*\.$", page, re.MULTILINE)) == set(CODES)
 
 
 @pytest.mark.parametrize(
     ("page", "start", "end", "written"),
     [
-        ("scenicq/docs/codes.md", "<!-- codes: `make golden` writes this -->\n", "<!-- end of codes -->", _codes),
+        ("scenicq/codes.md", "<!-- codes: `make golden` writes this -->\n", "<!-- end of codes -->", _codes),
         ("cli/README.md", "<!-- commands: `make golden` writes this -->\n", "<!-- end of commands -->", _reference),
         (
             "tests/language/world-model.md",

@@ -368,7 +368,7 @@ STEPS = sections(DECISIONS["matching.md"])["Steps of matching"]
 
 
 def test_every_step_of_matching_is_one_that_is_measured():
-    source = tree(ROOT / "tests/bench/steps.py")
+    source = tree(ROOT / "tests/tools/bench/steps.py")
     (measured,) = (
         [key.value for key in node.value.keys if isinstance(key, ast.Constant)]
         for node in source.body

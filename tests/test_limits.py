@@ -1,6 +1,6 @@
 """The table of limits: it is whole, each limit is read, and the page of contributors is made of it.
 
-What becomes of answers at each limit's least is in `tests/query/test_every_limit.py`.
+What becomes of answers at each limit's least is in `tests/units/query/test_every_limit.py`.
 """
 
 from __future__ import annotations

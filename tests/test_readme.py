@@ -12,28 +12,17 @@ import sys
 from pathlib import Path
 
 import pytest
+from console_blocks import blocks, matches, steps
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
-_BLOCK = re.compile(r"^```(console|python)\n(.*?)^```", re.DOTALL | re.MULTILINE)
 PAGES = [
     page
     for page in (ROOT / "README.md", ROOT / "cli" / "README.md", *sorted((ROOT / "scenicq" / "docs").glob("*.md")))
-    if _BLOCK.search(page.read_text(encoding="utf-8"))
+    if any(blocks(page.read_text(encoding="utf-8"), "console", "python"))
 ]
 WORDS = 1_500
 """As many as are read in five minutes, with the tables in between."""
-
-
-def _steps(block):
-    for part in re.split(r"^\$ ", block, flags=re.MULTILINE)[1:]:
-        command, _, output = part.partition("\n")
-        yield command, output
-
-
-def _matches(expected, actual):
-    parts = [re.escape(part) for part in expected.strip().split("...")]
-    return re.fullmatch(".*".join(parts), actual.strip(), re.DOTALL) is not None
 
 
 def _run_block(kind, text, folder, command):
@@ -44,14 +33,13 @@ def _run_block(kind, text, folder, command):
         if "for found in crossing:" in text:
             assert len(re.findall(r"^03-busy-intersection/\d\d {'ego': 'ego'", done.stdout, re.MULTILINE)) == 5
         return
-    for line, expected in _steps(text):
+    for line, expected in steps(text):
         if not line.startswith(("make", "pip", "git", "cd")):
             words = line.replace("scenicq ", f"{command} ", 1)
             done = subprocess.run(
                 words, shell=True, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False
             )
-            actual = re.sub(r"[ \t]+$", "", done.stdout, flags=re.MULTILINE)
-            assert _matches(expected, actual), f"$ {line}\n{actual}"
+            assert matches(expected, done.stdout), f"$ {line}\n{done.stdout}"
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
@@ -60,8 +48,8 @@ def test_what_a_page_shows_is_what_happens(page, crossroads, command, tmp_path):
     shutil.copytree(ROOT / "sample_data", tmp_path / "sample_data")
     if page.parent != ROOT:  # the first page says how `town` is made
         shutil.copytree(crossroads, tmp_path / "town")
-    for block in _BLOCK.finditer(page.read_text(encoding="utf-8")):
-        _run_block(block[1], block[2], tmp_path, command)
+    for block in blocks(page.read_text(encoding="utf-8"), "console", "python"):
+        _run_block(block[1], block[3], tmp_path, command)
 
 
 def test_the_readme_and_four_pages_show_what_happens():
@@ -84,6 +72,6 @@ def test_the_scenario_shown_is_the_one_that_is_run():
 
 
 def test_the_comparison_compares():
-    assert _matches("a\n...\nz", "a\nb\nc\nz\n")
-    assert not _matches("a\n...\nz", "a\nb\nc\n")
-    assert not _matches("a", "a\nb")
+    assert matches("a\n...\nz", "a\nb\nc\nz\n")
+    assert not matches("a\n...\nz", "a\nb\nc\n")
+    assert not matches("a", "a\nb")

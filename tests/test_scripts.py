@@ -10,11 +10,11 @@ from pathlib import Path
 import pytest
 
 TESTS = Path(__file__).parent
-FOLDERS = ("bench", "conformance", "dependencies", "fuzz", "mutation", "importers/fuzzing")
+FOLDERS = ("bench", "conformance", "dependencies", "fuzz", "mutation", "source_mutations")
 SCRIPTS = [
     file
     for folder in FOLDERS
-    for file in sorted((TESTS / folder).glob("*.py"))
+    for file in sorted((TESTS / "tools" / folder).glob("*.py"))
     if not file.name.startswith(("test_", "conftest"))
 ]
 ELSEWHERE = {"scenic", "rv_ltl", "coverage"}

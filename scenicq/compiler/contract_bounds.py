@@ -1,7 +1,7 @@
 """The bounds of contracts in one table, each with what it rests on.
 
 Simulated: traces of Scenic's Newtonian simulator. Driven: tracks of vehicles of recorded logs.
-`tests/conformance/contracts.py` measures both.
+`tests/tools/conformance/contracts.py` measures both.
 """
 
 from __future__ import annotations

@@ -48,17 +48,18 @@ CONTENTS = {
     ],
     "Reference": [
         "scenicq/docs/api",
-        "scenicq/docs/codes",
+        "scenicq/codes",
         "scenicq/importers/README",
         "scenicq/limits",
         "scenicq/evaluate/README",
     ],
+    "What commands say": ["tests/transcripts/*"],
     "Contributing": [
         "scenicq/docs/CONTRIBUTING",
         "scenicq/README",
         "scenicq/decisions/README",
         "scenicq/decisions/*",
-        "tests/conformance/README",
+        "tests/tools/conformance/README",
     ],
     "Releases": [f"scenicq/docs/{name}" for name in ("CHANGELOG", "versions", "licences", "SECURITY")],
 }

@@ -2,9 +2,9 @@
 
 An interval is an array (2, n) of lower and upper ends, a box an array (2, 2, n): coordinate, end, case. The functions
 take either where that makes sense. They are rounded outwards: a result holds the exact value, and the one that floating
-point gives, for all numbers within the arguments (`tests/match/fields/test_outward_rounding.py`), so that what is empty
-has no solution. Sums, products and quotients are off by half a unit in the last place, which one step outwards makes up
-for; functions of the C library and of NumPy are off by less than `LIBRARY`.
+point gives, for all numbers within the arguments (`tests/units/match/fields/test_outward_rounding.py`), so that what
+is empty has no solution. Sums, products and quotients are off by half a unit in the last place, which one step outwards
+makes up for; functions of the C library and of NumPy are off by less than `LIBRARY`.
 
 For cases of one correspondence, in which everything is random: all arrays have one length and are inverted as well
 (`contractor`). For candidates of roles, where most values are known numbers that must stay exact and
