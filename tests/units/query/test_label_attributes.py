@@ -16,7 +16,7 @@ from scenicq.store.dataset import open_dataset
 from scenicq.store.labels import Label, LabelObject, Recording
 from scenicq.store.writer import write_dataset
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 RAW = ROOT.parent / "shared" / "data" / "argoverse2" / "sensor" / "val"
 HEAD = "model scenic.domains.driving.model\nfrom scenicq.labels import nearest, others\n"
 ANYWHERE = "at (Range(-1e5, 1e5), Range(-1e5, 1e5)), facing Range(-180, 180) deg"
