@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cache, partial
 from pathlib import Path
 from typing import Literal
 
@@ -28,6 +29,7 @@ from scenicq.query.execution.never_compared import coverage
 from scenicq.query.execution.option_texts import QUERY_OPTIONS
 from scenicq.query.execution.program_files import SiblingFiles
 from scenicq.store.dataset import Dataset
+from scenicq.store.said_values import said_types
 
 from .datasets import open_checked
 from .main import ERROR
@@ -145,6 +147,7 @@ def _found(
     lacking: list[Diagnostic] = []
     rest: list[Diagnostic] = []
     compiled: list[tuple[Scenario, Network | None]] = []
+    attributes = None if asked.dataset is None else cache(partial(said_types, asked.dataset))
     for network in networks:
         try:
             loader = SiblingFiles(Path(source.name))
@@ -159,6 +162,7 @@ def _found(
                 map_defaults=asked.map_defaults,
                 scenario=asked.run_scenario,
                 params=asked.params,
+                label_attributes=attributes,
             )
         except ScenarioError as error:
             if asked.dataset is not None:

@@ -195,7 +195,7 @@ def match(ctx: click.Context, scenario: str | None, dataset: str | None, *, prog
 
     results = drawn(results) if selection is None else selection.applied(results, query.funnel, drawn)
     matching = MatchSample()
-    if summarized and not query.is_over_time():
+    if summarized:
         results = matching.gathered(results)
     came_close: list[str] = []
     with contextlib.nullcontext() if pieces is None else sole_writer(pieces):

@@ -18,7 +18,7 @@ from scenicq.errors import CannotEvaluate
 from scenicq.forest.column_domain import ColumnDomain, first_direction
 from scenicq.forest.columns import DEFINED, UNDEFINED, UNKNOWN, Array, Coded, Column, Data, Placed, truth_of
 from scenicq.forest.interpret import Steps, interpret, steps_of
-from scenicq.forest.nodes import ELEMENT, RANK, Among, AmongOp, Body, Feature, Leaf, Node
+from scenicq.forest.nodes import ELEMENT, OPEN, RANK, Among, AmongOp, Body, Feature, Leaf, Node
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.walk import postorder
 from scenicq.number_ranges import expand_ranges
@@ -70,7 +70,7 @@ def properties_of_others(scenario: Scenario) -> frozenset[str] | None:
         for node in postorder((todo.pop(),)):
             if isinstance(node, Among):
                 todo += node.body.parts
-            elif isinstance(node, Feature) and node.object == ELEMENT:
+            elif isinstance(node, Feature) and node.object == ELEMENT and node.property != OPEN:
                 found.add(node.property)
     return frozenset(found)
 
