@@ -1,6 +1,6 @@
 """Conditions on label objects without a role, of many labels side by side: for which labels they surely hold.
 
-Of a label alone, and where they do not surely hold, nothing is said: a search of its own tells.
+Nothing is said of a label alone, and where they do not surely hold: a search of its own tells.
 """
 
 from __future__ import annotations

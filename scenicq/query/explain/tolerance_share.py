@@ -1,7 +1,7 @@
 """How many matches there are by a tolerance alone: with exact positions, or headings, they would not be.
 
 They are matched again with that part of the tolerance left out, as many as there is time for, in an order that chance
-gives. Of an interval it is the first frame, with whoever plays the roles: no tolerance holds in conditions over time.
+gives; intervals at their first frames, with whoever plays the roles: no tolerance holds in conditions over time.
 What is undecided does not count.
 """
 
