@@ -11,11 +11,11 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
+from scenicq.errors import CannotEvaluate
 from scenicq.forest.among import LABEL_OBJECTS, LabelElements, among_column, asks_others
 from scenicq.forest.clear_columns import ClearColumns
 from scenicq.forest.column_domain import first_direction
 from scenicq.forest.columns import DEFINED, Column, constant_column, truth_of
-from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.groups import Condition, Group
 from scenicq.forest.interpret import interpret, steps_of
 from scenicq.forest.nodes import Constant, DirectionAt, Feature
