@@ -31,6 +31,8 @@ REACH = 20.0
 _BESIDE = 0.01
 """Metres beside a polyline that count as on it."""
 _CHUNK = 20_000
+_WIDE = 3.0
+"""Metres beside a centreline up to which most places of its lane lie."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +100,12 @@ class RoadDirection:
             owner, heading = self._headings(boxes[start : start + _CHUNK])
             found.append((owner + start, heading))
         return np.concatenate([owner for owner, _ in found]), np.concatenate([heading for _, heading in found])
+
+    def steps_to(
+        self, xy: Coordinates, steps: Coordinates
+    ) -> tuple[NDArray[np.intp], NDArray[np.float64], Coordinates]:
+        """Where a step along a lane may have led to some places, see `DirectedAreas`; not all of these lead there."""
+        return self._lanes.steps_to(xy, steps, _WIDE)
 
     def cells(self, bounds: Bounds) -> list[FieldCell]:
         """Convex cells that hold every (point, heading) within the bounds; those of lanes stay whole."""

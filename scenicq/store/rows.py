@@ -13,6 +13,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from scenicq.geometry.angles import normalize_array
+from scenicq.number_ranges import expand_ranges
 from scenicq.store.arrays import lists_at, number_array, repeated_texts
 from scenicq.store.camera_rows import camera_columns
 from scenicq.store.columns import OUT_OF_PLANE, MemberColumns, Memberships, RecordingColumns
@@ -136,7 +137,7 @@ def _placed(index: MapIndex | None, xy: NDArray[np.float64]) -> _Placed:
     counts = np.bincount(near.point, minlength=len(places))
     many = counts[at]
     point = np.repeat(np.arange(n), many)
-    pair = np.arange(len(point)) + np.repeat((np.cumsum(counts) - counts)[at] - (np.cumsum(many) - many), many)
+    pair = expand_ranges((np.cumsum(counts) - counts)[at], many)
     everywhere = Memberships(point, near.feature[pair], near.distance[pair])
     return _Placed(everywhere, index.lanes(places, near)[at], at, index.road_directions(places))
 

@@ -46,6 +46,7 @@ from scenicq.query.prefilter.plan import Plan
 from scenicq.recent import Recent
 from scenicq.store.dataset import Dataset, DatasetReference
 from scenicq.store.manifest import Counts
+from scenicq.store.said_values import said_types
 from scenicq.temporal.interval_options import IntervalOptions
 
 if TYPE_CHECKING:
@@ -148,6 +149,7 @@ class _Known:
         scenarios: The program over all maps that it fits, one of those that are alike.
         extents: Where the frames of each map are.
         coverage: What is compared.
+        attributes: The types of what labels say, by the names of attributes.
     """
 
     compiled: dict[str, CompiledMap] = field(default_factory=dict["str", CompiledMap])
@@ -159,6 +161,7 @@ class _Known:
     scenarios: list[Scenario] | None = None
     extents: dict[str, list[Extent]] | None = None
     coverage: Coverage | None = None
+    attributes: Mapping[str, frozenset[type]] | None = None
 
 
 @dataclass(eq=False)
@@ -207,9 +210,15 @@ class Query:
             behaviors=self.options.behaviors, reaction_s=self.options.reaction_s, loader=self.siblings,
             model=self.options.model, map_defaults=self.options.map_defaults, gap_s=self.options.time.gap_s,
             lanes=self.options.lanes, scenario=self.options.run_scenario, params=dict(self.options.params),
+            label_attributes=self._label_attributes,
         )  # fmt: skip
         check_enforced(scenario, self.options.match.enforce)
         return ready(scenario)
+
+    def _label_attributes(self) -> Mapping[str, frozenset[type]]:
+        if self._known.attributes is None:
+            self._known.attributes = said_types(self.dataset)
+        return self._known.attributes
 
     def _check_ego(self) -> None:
         """Refuse to take a stand-in for an ego that the source does not have."""

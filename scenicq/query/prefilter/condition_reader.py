@@ -51,6 +51,7 @@ from scenicq.query.prefilter.map_relations import (
     shared_look_ups,
 )
 from scenicq.query.prefilter.regions import near_region, nearest_box
+from scenicq.query.prefilter.said_columns import in_said_truths, said_columns
 from scenicq.query.prefilter.sql_bounds import ARITHMETIC, SqlBounds
 from scenicq.query.prefilter.sql_ends import (
     SQL,
@@ -138,12 +139,14 @@ class ConditionReader:
     proving: bool = False
     radius: float | None = None
     _required: tuple[Node, ...] = field(init=False)
+    _said: tuple[Node, ...] = field(init=False)
     _bounds: dict[tuple[int, ...], SqlBounds] = field(default_factory=dict["tuple[int, ...]", "SqlBounds"])
 
     def __post_init__(self) -> None:
         """Take apart what is required."""
         stated = [each.condition for each in self.scenario.requirements if each.built_in is None]
         self._required = tuple(part for each in stated for part in conjuncts(each))
+        self._said = tuple(map(in_said_truths, self._required))
 
     def comparison(
         self, item: Comparison, meant: MeantElements | None = None, heading: Node | None = None
@@ -182,7 +185,7 @@ class ConditionReader:
             root: The condition.
             meant: The elements that may be meant where the ego is, where that is to be proved.
         """
-        for part in conjuncts(in_ego_frame(root, self.scenario.ego)):
+        for part in conjuncts(in_said_truths(in_ego_frame(root, self.scenario.ego))):
             objects = self._objects(part)
             looked_up = self._looked_up(part, objects, meant)
             if looked_up is not None:
@@ -436,6 +439,9 @@ class ConditionReader:
                 for index, (alias, prefix) in aliases.items()
                 for name, column in object_columns(alias, prefix).items()
             }
+            attributes = {index: f"{alias}.{prefix}attributes" for index, (alias, prefix) in aliases.items()}
+            own = [(index, name) for index in aliases for name in self.scenario.objects[index].properties]
+            columns |= said_columns(self._said, attributes, own)
             self._bounds[objects] = SqlBounds(columns, self._nearest)
         return self._bounds[objects]
 

@@ -13,6 +13,7 @@ from scenicq.errors import Span
 from scenicq.forest.groups import PARAMS, Comparison, Condition, Group
 from scenicq.forest.nodes import Node, PointIn, Select
 from scenicq.forest.scenario import Scenario
+from scenicq.forest.unobserved import is_only_observed
 from scenicq.forest.walk import conjuncts, postorder
 from scenicq.geometry.network import Network
 from scenicq.match.options import MatchOptions
@@ -93,7 +94,11 @@ def sufficient_conditions(
     reader = ConditionReader(scenario, tolerance, relations, network.roadDirection, proving=True, radius=options.radius)
     relevant = relevant_properties(scenario, options)
     found = list(_without_attributes(scenario, options, relevant))
-    signature = (*(names & _COLUMNED for names in relevant), frozenset[str]())
+    told = [
+        frozenset(name for name in names if name in _COLUMNED or is_only_observed(scenario, index, name))
+        for index, names in enumerate(relevant)
+    ]
+    signature = (*told, frozenset[str]())
     for group in build_groups(scenario, signature, options):
         found += _proof(group, reader, scenario.ego, options.classes)
     if any(each.sql is False for each in found):
@@ -107,7 +112,8 @@ def _without_attributes(
     """That a label has an ego and nothing that is compared but what has columns."""
     yield ColumnCondition((), f"{EGO}.ego_class <> ''")
     for index, names in enumerate(relevant):
-        others = sorted(names - _COLUMNED)
+        # what labels alone tell is read, not taken for granted
+        others = sorted(name for name in names - _COLUMNED if not is_only_observed(scenario, index, name))
         if others and index == scenario.ego:
             yield ColumnCondition((), _lacks(f"{EGO}.ego_attributes", others))
         elif others:

@@ -15,9 +15,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from scenicq.errors import CannotEvaluate
 from scenicq.forest.column_domain import ColumnDomain, first_direction
 from scenicq.forest.columns import DEFINED, UNKNOWN, Column, truth_of
-from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.interpret import interpret, steps_of
 from scenicq.forest.nodes import (
     Arithmetic,
