@@ -18,6 +18,7 @@ from scenicq.geometry.cell_guards import segment_distances
 from scenicq.geometry.fields import FieldCell
 from scenicq.geometry.road_cells import Outline, convex_outlines, segment_cells
 from scenicq.geometry.shapes import Bounds, Coordinates, Shape
+from scenicq.number_ranges import expand_ranges
 
 __all__ = ["ONE_HEADING", "TIE", "AreaPairs", "DirectedAreas", "DirectedLane", "distinct_pairs", "rotated"]
 
@@ -230,9 +231,7 @@ def rotated(xy: Coordinates, angles: NDArray[np.float64]) -> Coordinates:
 def _each_segment(owner: NDArray[np.intp], area: NDArray[np.intp], starts: NDArray[np.intp]) -> AreaPairs:
     """Pairs (owner, segment) for all segments of each owner's area."""
     counts = starts[area + 1] - starts[area]
-    pair = np.repeat(np.arange(len(area)), counts)
-    segment = np.arange(len(pair)) - np.repeat(np.cumsum(counts) - counts, counts) + starts[area][pair]
-    return owner[pair], segment
+    return np.repeat(owner, counts), expand_ranges(starts[area], counts)
 
 
 def headings_by_point(owner: NDArray[np.intp], heading: NDArray[np.float64], count: int) -> list[tuple[float, ...]]:

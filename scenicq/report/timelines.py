@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import groupby
+from typing import TYPE_CHECKING
 
 from scenicq.query.execution.interval_frames import frames_of, verdict_at
 from scenicq.query.execution.recorded_columns import show_cell
@@ -13,6 +14,10 @@ from scenicq.query.explain.bands import Band, bands_of, conditions_over
 from scenicq.query.explain.interval_explanation import placed
 from scenicq.report.runs import FrameRun
 from scenicq.report.svg import element, escape
+from scenicq.report.templates import markup
+
+if TYPE_CHECKING:
+    pass
 
 __all__ = ["interval_runs"]
 
@@ -54,12 +59,12 @@ def _timeline(query: Query, result: Result) -> str:
     return _drawn(bands, [*filter(None, curves)])
 
 
-def _curve(name: str, values: Sequence[RecordedCell]) -> str:
-    """Numbers over the samples, with gaps where there are none; nothing of what has no numbers."""
+def _curve(name: str, values: Sequence[RecordedCell]) -> tuple[str, str] | None:
+    """Numbers over the samples in words and drawn, with gaps where there are none; None of what has no numbers."""
     numbers = [None if each is None or isinstance(each, str | tuple) else float(each) for each in values]
     known = [each for each in numbers if each is not None]
     if not known:
-        return ""
+        return None
     least, most = min(known), max(known)
     height = (most - least) or 1.0
     points = [
@@ -77,11 +82,11 @@ def _curve(name: str, values: Sequence[RecordedCell]) -> str:
     lines.append(element("line", class_="now", x1=0.5, x2=0.5, y1=0, y2=10))
     strip = element("svg", element("title", escape(told)), *lines, class_="strip curves", role="img",
                     viewBox=f"0 0 {len(values)} 10", preserveAspectRatio="none", aria_label=told)  # fmt: skip
-    return element("li", element("span", escape(told)), strip)
+    return told, strip
 
 
-def _drawn(bands: tuple[Band, ...], curves: Sequence[str]) -> str:
-    rows: list[str] = []
+def _drawn(bands: tuple[Band, ...], curves: Sequence[tuple[str, str]]) -> str:
+    rows: list[tuple[str, bool, str]] = []
     for band in bands:
         count = len(band.values)
         strips = [
@@ -93,10 +98,8 @@ def _drawn(bands: tuple[Band, ...], curves: Sequence[str]) -> str:
         strips.append(element("line", class_="now", x1=0.5, x2=0.5, y1=0, y2=10))
         strip = element("svg", *strips, class_="strip", role="img", viewBox=f"0 0 {count} 10",
                         preserveAspectRatio="none", aria_label=_summary(band.values))  # fmt: skip
-        told = element("b" if band.is_requirement else "span", escape(band.what))
-        rows.append(element("li", told, strip))
-    rows += curves
-    return element("ul", *rows, class_="timeline", aria_label="Timeline") if rows else ""
+        rows.append((band.what, band.is_requirement, strip))
+    return markup("sheet", "timeline", bands=rows, curves=curves) if rows or curves else ""
 
 
 def _pieces(values: tuple[int, ...]) -> Iterator[tuple[int, int, int]]:

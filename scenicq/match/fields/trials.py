@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.budget import look
+from scenicq.errors import CannotEvaluate
 from scenicq.forest.column_domain import ColumnDomain
 from scenicq.forest.columns import DEFINED, UNDEFINED, Column
-from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.interpret import OnMap, Steps, interpret, steps_of
 from scenicq.forest.nodes import Constant, DirectionAt, Feature, Identity, Index, Leaf, Node, Select
 from scenicq.forest.walk import children

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.budget import Exhausted, Trials, trials_left
-from scenicq.forest.compute import CannotEvaluate
+from scenicq.errors import CannotEvaluate
 from scenicq.forest.nodes import Identity, Index, Leaf, PointIn, Value
 from scenicq.limits import LIMITS, exhausted
 from scenicq.match.fields.constraint_network import ConstraintNetwork

@@ -17,11 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.budget import look
+from scenicq.errors import CannotEvaluate
 from scenicq.forest.columns import DEFINED, UNDEFINED, value_reader
-from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.kinds import kind_of
 from scenicq.forest.nodes import Identity, Kind, Node, Value
 from scenicq.forest.scenario import RecordedValue, Scenario
+from scenicq.forest.unobserved import is_only_observed
 from scenicq.forest.walk import features, leaves
 from scenicq.limits import LIMITS
 from scenicq.match.options import MatchOptions
@@ -79,7 +80,7 @@ class Recorder:
         todo = list(features(*(each.value for each in self.scenario.records)))
         while todo:
             index, name = todo.pop()
-            if index < 0 or name in MOVING or (index, name) in found:
+            if index < 0 or name in MOVING or (index, name) in found or is_only_observed(self.scenario, index, name):
                 continue
             found[index, name] = None
             todo += features(self.scenario.objects[index].properties[name].value)
