@@ -133,7 +133,7 @@ class FrameResult(_Origin):
 
     @property
     def timeline(self) -> tuple[ModeRecord, ...]:
-        """What roles, monitors and scenarios of an interval that matches do from when to when, worked out when asked."""
+        """What roles, monitors and scenarios of an interval that matches do from when to when, found when asked."""
         (told,) = self.matches.query.with_timelines([self.result])
         return told.timeline or ()
 

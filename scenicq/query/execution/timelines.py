@@ -31,6 +31,8 @@ from scenicq.temporal.truth import Truth
 
 __all__ = ["Timelines", "mode_records"]
 
+_KINDS = ("behavior", "scenario", "monitor")
+
 
 @dataclass(eq=False)
 class _Variant:
@@ -189,7 +191,8 @@ def mode_records(
         found.append(
             ModeRecord(kind, of, _places(each.activity), times_us[each.first], end_us, each.last - each.first + 1)
         )
-    return tuple(found)
+    # roles first, then scenarios and monitors
+    return tuple(sorted(found, key=lambda each: _KINDS.index(each.kind)))
 
 
 def _whose(scenario: Scenario, process: Process, activity: Activity | None) -> tuple[str, str]:

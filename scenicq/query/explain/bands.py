@@ -165,6 +165,7 @@ def show_bands(bands: Sequence[Band]) -> list[str]:
 
 
 def shortened(text: str) -> str:
+    """A text as long as a name in a line may be."""
     return text if len(text) <= 48 else f"{text[:47]}\N{HORIZONTAL ELLIPSIS}"
 
 

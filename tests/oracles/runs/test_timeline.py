@@ -8,6 +8,10 @@ import numpy as np
 import pytest
 from behaviors_definition import ATOMS, Doing, N, completions, modes, places_of, random_program, text_of
 from compiled_processes import compiled, numbers_of
+from modular_definition import ATOMS as CONDITIONS
+from modular_definition import all_runs
+from modular_definition import random_program as random_scenarios
+from modular_definition import text_of as text_of_scenarios
 
 from scenicq.errors import Span
 from scenicq.forest.temporal import Activity
@@ -98,3 +102,48 @@ def test_behaviors_are_in_the_modes_of_their_definition(seed: int) -> None:
                 for key in keys:
                     if key in shown and key not in known:
                         assert len({way[key] for several in ways for way in several}) > 1, (text, start, key)
+
+
+@pytest.mark.parametrize("seed", range(200))
+@pytest.mark.one_in(12)
+def test_scenarios_run_when_their_definition_runs_them(seed: int) -> None:
+    draw = random.Random(seed)
+    dynamics = None
+    while dynamics is None:
+        program = random_scenarios(draw)
+        text = text_of_scenarios(program)
+        dynamics = compiled(text)
+    numbers, machine = numbers_of(dynamics), RunMachine(dynamics)
+    composes = next(number for number, each in enumerate(dynamics.processes) if each.composes)
+    for _ in range(3):
+        times = [float(each) for each in np.cumsum([draw.choice([0.1, 0.1, 0.2]) for _ in range(8)])]
+        rows = [[draw.random() < 0.6 for _ in range(CONDITIONS)] for _ in range(8)]
+        columns = {
+            atom: np.array([TRUE if row[number] else FALSE for row in rows], np.int8)
+            for atom, number in numbers.items()
+        }
+        runs = follow_runs(
+            machine, Timeline(np.array([0, 8]), np.array(times), np.arange(8)),
+            lambda atom, columns=columns: columns[atom.number].copy(),
+        )  # fmt: skip
+        for number in np.flatnonzero(runs.truth == TRUE).tolist():
+            start, end = int(runs.starts[number]), int(runs.ends[number])
+            ways = all_runs(program, rows, times, start)
+            if ways is None:
+                continue
+            own = slice(start, end + 1)
+            times_us = np.round(np.array(times[own]) * 1e6).astype(np.int64)
+            shown: dict[int, set[tuple[str, ...]]] = {at: set() for at in range(start, end + 1)}
+            for each in timeline_of(dynamics, times_us, {atom: truth[own] for atom, truth in columns.items()}):
+                if each.process == composes:
+                    assert each.activity is not None
+                    calls = (*each.activity.calls, each.activity.what)
+                    for at in range(start + each.first, start + each.last + 1):
+                        shown[at].add(tuple(call.text.partition("(")[0] for call in calls))
+            # one of the ways to choose is told
+            assert any(
+                all(running.get(at, set()) == shown[at] for at in range(start, end + 1 - (over and at_end)))
+                for ends, over, running in ways
+                if end in ends
+                for at_end in [over and end == max(ends)]
+            ), (text, rows, start, end, shown, [running for ends, _, running in ways if end in ends])
