@@ -439,7 +439,7 @@ class RunMachine:
                     if not over:
                         runs = [
                             tuple(
-                                [each for each in told if each.scenario < 0 or after.running[each.scenario] != _ENDED]
+                                [each for each in told if after.running[each.scenario : each.scenario + 1] != (_ENDED,)]
                             )
                             for told in met
                         ]

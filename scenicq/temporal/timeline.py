@@ -19,7 +19,7 @@ from scenicq.temporal.run_machine import Advance, Choices, RunMachine
 from scenicq.temporal.runs import later_sample
 from scenicq.temporal.truth import UNKNOWN, Truth
 
-__all__ = ["ModeSegment", "timeline_of"]
+__all__ = ["ModeSegment", "RunTimeline", "timeline_of"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,15 +38,26 @@ class ModeSegment:
     last: int
 
 
+@dataclass(frozen=True, slots=True)
+class RunTimeline:
+    """The modes of a run, process by process, in order of time.
+
+    Attributes:
+        segments: The modes.
+        may_match: Whether it may end as a match with the last sample.
+    """
+
+    segments: tuple[ModeSegment, ...]
+    may_match: bool
+
+
 _Ways = Callable[[int, int], Iterator[tuple[Advance, Choices]]]
 _Step = tuple[int, Choices]
 """A situation, and what is chosen in it."""
 
 
-def timeline_of(
-    dynamics: Dynamics, times_us: NDArray[np.int64], truths: Mapping[int, Truth]
-) -> tuple[ModeSegment, ...]:
-    """The modes of a run, process by process: of one that matches and ends with the last sample, if there is one.
+def timeline_of(dynamics: Dynamics, times_us: NDArray[np.int64], truths: Mapping[int, Truth]) -> RunTimeline:
+    """The modes of a run: of one that matches and ends with the last sample, if there is one.
 
     Args:
         dynamics: The program.
@@ -65,7 +76,7 @@ def timeline_of(
         later = partial(later_sample, seconds, here)
         return machine.ways(situation, values[here], due=due[here], here=here, later=later)
 
-    path, over = _path(machine, ways, len(seconds))
+    path, over, may_match = _path(machine, ways, len(seconds))
     count = len(dynamics.processes)
     doing: list[tuple[tuple[Activity, ...] | None, ...]] = []
     for here in range(len(seconds) - over):
@@ -79,14 +90,14 @@ def timeline_of(
     found: list[ModeSegment] = []
     for number in range(count):
         found += _segments(number, [each[number] for each in doing], composes=dynamics.processes[number].composes)
-    return tuple(found)
+    return RunTimeline(tuple(found), may_match)
 
 
-def _path(machine: RunMachine, ways: _Ways, size: int) -> tuple[list[_Step], bool]:
-    """The situations that a run goes through with what it chooses, and whether it is over with the last sample."""
+def _path(machine: RunMachine, ways: _Ways, size: int) -> tuple[list[_Step], bool, bool]:
+    """The situations of a run with what it chooses, whether it is over with the last sample, and may match."""
     # each situation before a sample, with the step that leads there
     layers: list[dict[int, _Step | None]] = [{0: None}]
-    ends: list[tuple[tuple[int, ...], _Step, bool]] = []
+    ends: list[tuple[tuple[int, int], _Step, bool]] = []
     for here in range(size):
         after: dict[int, _Step | None] = {}
         for situation in layers[here]:
@@ -103,9 +114,10 @@ def _path(machine: RunMachine, ways: _Ways, size: int) -> tuple[list[_Step], boo
             # what is lost for good is followed where nothing else is left
             hopeful = {each: step for each, step in going.items() if not machine.situations[each].is_lost}
             layers.append(hopeful or going)
-    over = False
+    over = may_match = False
     if ends:
-        _, step, over = max(ends, key=lambda each: each[0])
+        (rank, _), step, over = max(ends, key=lambda each: each[0])
+        may_match = rank > 0
     else:
         step = next(iter(layers[-1])), {}
     path = [step]
@@ -113,11 +125,11 @@ def _path(machine: RunMachine, ways: _Ways, size: int) -> tuple[list[_Step], boo
         before = layer[path[-1][0]]
         assert before is not None
         path.append(before)
-    return path[::-1], over
+    return path[::-1], over, may_match
 
 
-def _ends(machine: RunMachine, advance: Advance, step: _Step) -> Iterator[tuple[tuple[int, ...], _Step, bool]]:
-    """How a run may end with the last sample, each with how well: a match first."""
+def _ends(machine: RunMachine, advance: Advance, step: _Step) -> Iterator[tuple[tuple[int, int], _Step, bool]]:
+    """How a run may end with the last sample, each with how well: above 0 where it may be a match."""
     terminates = machine.dynamics.terminates
     if advance.may_match or advance.may_fail:
         yield (2 * advance.may_match, -advance.may_fail), step, True

@@ -48,6 +48,7 @@ class _Variant:
     outcomes: tuple[Outcome, ...] = field(init=False)
     samples: ResultSamples = field(init=False)
     arrivals: Arrivals | None = field(init=False)
+    _read: dict[int, list[str]] = field(init=False, default_factory=dict["int", "list[str]"])
 
     def __post_init__(self) -> None:
         """Read what it says over time."""
@@ -61,6 +62,15 @@ class _Variant:
     def roles(self) -> frozenset[str]:
         """The names of its objects."""
         return frozenset(owner.name for owner in self.scenario.every_object)
+
+    def read(self, outcome: int) -> list[str]:
+        """The random variables that conditions over time hang on, with an outcome."""
+        if outcome not in self._read:
+            scenario = self.outcomes[outcome].scenario
+            conditions = () if scenario.dynamics is None else scenario.dynamics.conditions
+            written = [expand(each, lambda feature: steady_value(scenario, feature)) for each in conditions]
+            self._read[outcome] = [leaf.span.mark for leaf in leaves(*written) if leaf.span is not None]
+        return self._read[outcome]
 
     def outcome(self, witness: Mapping[str, WitnessValue]) -> int:
         """The number of the outcome of choices that a witness has."""
@@ -99,31 +109,31 @@ class Timelines:
     def _of_recording(self, recording: str, results: list[Result]) -> Iterator[Result]:
         matches = [each for each in results if isinstance(each.verdict, Match)]
         told: dict[int, tuple[ModeRecord, ...]] = {}
+        sure: set[int] = set()
         with Members.of_recording(self.dataset, recording) as members:
             for variant in self._variants:
-                mine = [n for n, each in enumerate(matches) if self._variant_of(each) is variant]
+                # a run may have the same objects whenever they come
+                mine = [n for n, each in enumerate(matches) if n not in sure and variant.roles == _roles(each)]
                 some = [matches[number] for number in mine]
                 for own in variant.samples.stretches(members, some):
-                    for number, modes in self._modes(variant, members, own, some):
-                        told[mine[number]] = modes
+                    for number, modes, may_match in self._modes(variant, members, own, some):
+                        if may_match or mine[number] not in told:
+                            told[mine[number]] = modes
+                        sure |= {mine[number]} if may_match else set()
         modes_of = iter(told.get(number, ()) for number in range(len(matches)))
         for each in results:
             yield replace(each, timeline=next(modes_of)) if isinstance(each.verdict, Match) else each
 
-    def _variant_of(self, result: Result) -> _Variant | None:
-        roles = cast(Match, result.verdict).correspondence.keys()
-        return next((each for each in self._variants if each.roles == roles), None)
-
     def _modes(
         self, variant: _Variant, members: Members, own: ResultStretches, matches: Sequence[Result]
-    ) -> Iterator[tuple[int, tuple[ModeRecord, ...]]]:
-        """The modes of some matches, each with its number."""
+    ) -> Iterator[tuple[int, tuple[ModeRecord, ...], bool]]:
+        """The modes of some matches, each with its number, and whether the run may be one that matches."""
         # matches with the same values of random variables are read together
         alike: dict[tuple[int, tuple[tuple[str, WitnessValue], ...]], list[int]] = {}
         for place, number in enumerate(own.numbers):
             witness = cast(Match, matches[number].verdict).witness
             outcome = variant.outcome(witness)
-            read = self._read(variant, outcome)
+            read = variant.read(outcome)
             alike.setdefault((outcome, tuple((each, witness[each]) for each in read if each in witness)), []).append(
                 place
             )
@@ -138,14 +148,8 @@ class Timelines:
             for which, chosen in zip(some.numbers, some.slices(), strict=True):
                 here = {each: truth[chosen] for each, truth in truths.items()}
                 mine = times_us[labels[chosen]]
-                yield which, mode_records(scenario, timeline_of(scenario.dynamics, mine, here), mine.tolist())
-
-    def _read(self, variant: _Variant, outcome: int) -> list[str]:
-        """The random variables that conditions over time hang on."""
-        scenario = variant.outcomes[outcome].scenario
-        conditions = () if scenario.dynamics is None else scenario.dynamics.conditions
-        written = [expand(each, lambda feature: steady_value(scenario, feature)) for each in conditions]
-        return [leaf.span.mark for leaf in leaves(*written) if leaf.span is not None]
+                run = timeline_of(scenario.dynamics, mine, here)
+                yield which, mode_records(scenario, run.segments, mine.tolist()), run.may_match
 
     def _truths(
         self, variant: _Variant, scenario: Scenario, own: ResultStretches, witness: Mapping[str, WitnessValue]
@@ -169,6 +173,10 @@ class Timelines:
 
             found.update(variant.arrivals.truths(own.samples.at(own.places()), own.bounds(), label))
         return found
+
+
+def _roles(result: Result) -> frozenset[str]:
+    return frozenset(cast(Match, result.verdict).correspondence)
 
 
 def mode_records(

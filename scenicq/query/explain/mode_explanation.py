@@ -153,7 +153,7 @@ def run_modes(
     if dynamics is None or not dynamics.processes:
         return None
     within = slice(interval.start, interval.end + 1)
-    segments = timeline_of(dynamics, tracks.times_us[within], over.truths)
+    segments = timeline_of(dynamics, tracks.times_us[within], over.truths).segments
     return RunModes(scenario, tracks.seconds[within].tolist(), over, segments)
 
 

@@ -72,9 +72,10 @@ def test_behaviors_are_in_the_modes_of_their_definition(seed: int) -> None:
             start, end = int(runs.starts[number]), int(runs.ends[number])
             own = slice(start, end + 1)
             times_us = np.round(np.array(times[own]) * 1e6).astype(np.int64)
-            found = timeline_of(dynamics, times_us, {atom: each[own] for atom, each in columns.items()})
+            run = timeline_of(dynamics, times_us, {atom: each[own] for atom, each in columns.items()})
+            assert run.may_match
             shown: dict[tuple[str, int], Told | None] = {}
-            for each in found:
+            for each in run.segments:
                 owner = dynamics.processes[each.process].object
                 for at in range(each.first, each.last + 1):
                     key = names[owner], start + at
@@ -134,7 +135,7 @@ def test_scenarios_run_when_their_definition_runs_them(seed: int) -> None:
             own = slice(start, end + 1)
             times_us = np.round(np.array(times[own]) * 1e6).astype(np.int64)
             shown: dict[int, set[tuple[str, ...]]] = {at: set() for at in range(start, end + 1)}
-            for each in timeline_of(dynamics, times_us, {atom: truth[own] for atom, truth in columns.items()}):
+            for each in timeline_of(dynamics, times_us, {atom: truth[own] for atom, truth in columns.items()}).segments:
                 if each.process == composes:
                     assert each.activity is not None
                     calls = (*each.activity.calls, each.activity.what)
