@@ -28,7 +28,8 @@ def ahead(run: Interpreter, span: Span, owner: ModelValue, distance: ModelValue)
     """`ahead(obj, d)` of `scenicq.labels`: what lies in an object's lanes, from it to so many metres on.
 
     Raises:
-        ScenarioError: wrong-type, where it is no object; wrong-value, for what is no positive known number.
+        ScenarioError: wrong-type, where it is no object; wrong-value, for what is no positive known number; map-lacks,
+            where no lane has a direction.
     """
     if not isinstance(owner, Instance) or owner.index is None:
         shown = f"a hidden `{owner.cls.name}`" if isinstance(owner, Instance) else describe(owner)
@@ -38,6 +39,9 @@ def ahead(run: Interpreter, span: Span, owner: ModelValue, distance: ModelValue)
     if isinstance(number, bool) or not isinstance(number, int | float) or not 0 < number < 1e6:
         raise fail("wrong-value", "`ahead` needs a known number of metres, which is positive", span,
                    f"this is {number if isinstance(number, int | float) else describe(distance)}")  # fmt: skip
+    if run.network.roadDirection.is_nowhere:
+        hint = f"`0 < along(A, B) < {number:g} and abs(beside(A, B)) < 1.5` asks for B on the course of A, with no map"
+        raise fail("map-lacks", "the map has no lane in which anything could be ahead", span, "needs lanes", (hint,))
     way, last = going_of(run, owner, span) or (build.constant(None, span), build.constant(None, span))
     return AheadInLanes(to_vector(owner, span), way, last, build.constant(float(number)), run.network, span=span)
 

@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING, Any, Protocol, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from scenicq.errors import DataError, Diagnostic
+from scenicq.errors import DataError, Diagnostic, similar
 from scenicq.importers.fields import NO_MAP, InvalidError, parse_json
 from scenicq.importers.folders import read_bytes
 from scenicq.importers.report import Report
-from scenicq.store.classes import ROOT, is_class
+from scenicq.store.classes import ROOT, is_class, subclasses
 from scenicq.store.columns import RecordingColumns, columns_of, take_labels
 from scenicq.store.labels import Label, Recording
 from scenicq.store.value_rules import Problems, find_problems
@@ -158,7 +158,9 @@ class ClassNames:
         if (category := self.known.get(name)) is not None:
             return category
         message = f"class `{name}` is in no taxonomy; its objects become `{ROOT}`"
-        hint = f'a class map with {{"{name}": CLASS}} gives it a class: `--class-map FILE`'
+        near = similar(name.capitalize(), subclasses(ROOT))
+        meant = f'"{near}"' if near else "CLASS"
+        hint = f'a class map with {{"{name}": {meant}}} gives it a class: `--class-map FILE`'
         self._report.kept("object", "unknown-class", message, name=name, hints=(hint,))
         return ROOT
 

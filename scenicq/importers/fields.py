@@ -135,7 +135,7 @@ def whole(value: float, key: str) -> int:
         InvalidError: It is none.
     """
     if isinstance(value, float) and not value.is_integer():
-        raise InvalidError(f"`{key}` is not a whole number but {_kind(value)}")
+        raise InvalidError(f"`{key}` is {value!r}, which is not a whole number: round it")
     if abs(value) > _LARGEST:
         raise InvalidError(f"`{key}` is out of range")
     return int(value)

@@ -65,6 +65,10 @@ def _installed() -> dict[str, Importer]:
     return found
 
 
+_TABLES = (".csv", ".tsv", ".xlsx", ".parquet", ".json", ".jsonl")
+_OWN_TABLE = 'a table of your own becomes a source in a few lines: "Your own labels" in scenicq/docs/data.md'
+
+
 def choose_importer(source: Path, name: str | None = None) -> Importer:
     """The importer that reads a source.
 
@@ -98,6 +102,8 @@ def choose_importer(source: Path, name: str | None = None) -> Importer:
         hints = tuple(f"`--format {importer}` chooses one" for importer in claimants)
         raise DataError(Diagnostic("dataset-ambiguous", f"{source} is recognised by {names}", hints=hints))
     hints = tuple(f"`{importer.name}` looks for {importer.layout}" for importer in importers().values())
+    if source.suffix.lower() in _TABLES:
+        hints = (_OWN_TABLE, *hints)
     if is_dataset(source):
         hints = ("it is a dataset of scenicq already",)
     raise DataError(Diagnostic("dataset-unrecognised", f"no importer recognises {source}", hints=hints))

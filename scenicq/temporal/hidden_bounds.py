@@ -72,7 +72,7 @@ class PossibleValues:
 
     def _narrow(self, hidden: HiddenConditions, atom: Atom, starts: Places, ends: Places, *, always: bool) -> None:
         """Leave out values with which a condition does not hold from each start to an end, or nowhere there."""
-        possible = hidden.possible(atom.number) if atom.number in hidden.of else None
+        possible = hidden.possible_range(atom.number) if atom.number in hidden.cuts_of else None
         if possible is None:
             return
         variable, low, high = possible
@@ -92,11 +92,11 @@ def _ends(
     due = times_out(stretches, required.within_s)
     first, latest = due, np.minimum(due, last)
     conditions = [each.condition for each in machine.dynamics.terminations if each.condition is not None]
-    unclear = any(each.number in hidden.of for each in conditions) or len(required.ends) < len(conditions)
+    unclear = any(each.number in hidden.cuts_of for each in conditions) or len(required.ends) < len(conditions)
     if machine.dynamics.processes or unclear:
         first = starts
     for each in conditions:
-        if each.number not in hidden.of:
+        if each.number not in hidden.cuts_of:
             truth = atom(each)
             latest = np.minimum(latest, next_at(truth == TRUE)[starts])
             first = np.minimum(first, next_at(truth > FALSE)[starts])

@@ -1,7 +1,8 @@
-"""Conditions that hang on hidden numbers: at each sample, which side of some thresholds a number must be on.
+"""Conditions that depend on hidden variables: at each sample, on which side of some thresholds a variable must be.
 
-A comparison that is affine in one hidden number changes its outcome at one value of it at each sample, a *cut*. Between
-the cuts every condition is constant, so it has one column for each choice of the sides.
+A comparison that is affine in one hidden variable changes its outcome at one value of it at each sample, a *cut*.
+Values from the cut on are its *upper side*. Between the cuts every condition is constant, so it has one column for each
+choice of sides.
 """
 
 from __future__ import annotations
@@ -32,11 +33,11 @@ Numbers = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Cut:
-    """At each place the least value of a hidden number that is on the upper side.
+    """The threshold of a hidden variable at each sample: a comparison changes its outcome there.
 
     Attributes:
         variable: The number of the variable.
-        at: The values, shape (n,); infinite where all are on one side.
+        at: The least value on the upper side, shape (n,); infinite where all values are on one side.
     """
 
     variable: int
@@ -44,38 +45,38 @@ class Cut:
 
 
 @dataclass(slots=True)
-class _Sides:
-    """The left side of a comparison minus the right one, at each place.
+class _Difference:
+    """The left operand of a comparison minus the right one, at each sample, as a line over a hidden variable.
 
     Attributes:
-        variable: The number of the hidden number that it hangs on.
-        at_0: The difference where that is 0.
-        slope: By how much it grows with it.
-        unknown: Where it is not known.
-        equal: For which value both sides are equal; not finite where there is none.
+        variable: The number of the variable.
+        at_zero: The difference if the variable is 0.
+        slope: By how much the difference grows with the variable.
+        unknown: Where the difference is not known.
+        root: The value of the variable at which both operands are equal; not finite if there is none.
     """
 
     variable: int
-    at_0: Numbers
+    at_zero: Numbers
     slope: Numbers
     unknown: NDArray[np.bool_]
-    equal: Numbers = field(init=False)
+    root: Numbers = field(init=False)
 
     def __post_init__(self) -> None:
-        """Find where both sides are equal."""
+        """Find where both operands are equal."""
         with np.errstate(all="ignore"):
-            self.equal = -self.at_0 / self.slope
+            self.root = -self.at_zero / self.slope
 
 
 @dataclass(frozen=True, slots=True)
 class _Comparison:
-    """A comparison with a hidden number.
+    """A comparison with a hidden variable.
 
     Attributes:
         node: The comparison.
         cuts: The numbers of its cuts, the lower one first.
-        values: Its value below the first cut, from it on, and from the second on.
-        status: Where it is known, undefined or not observed.
+        values: Its value below the first cut, from the first on, and from the second on.
+        status: Where it is known, undefined or unobserved.
     """
 
     node: Compare
@@ -86,18 +87,18 @@ class _Comparison:
 
 @dataclass(eq=False, slots=True)
 class HiddenConditions:
-    """The conditions of a program over time that hang on hidden numbers, over some places.
+    """The conditions of a program over time that depend on hidden variables, over some samples.
 
     Attributes:
-        columns: What is observed at the places.
+        columns: What is observed at the samples.
         expanded: All conditions over time.
         variables: Their random variables.
-        low, high: Ends of the values of each variable.
+        low, high: The range of each variable.
         cuts: All cuts.
-        of: The cuts of each condition that hangs on a variable, by its number.
+        cuts_of: For each condition with a hidden variable, by the condition's number: the numbers of its cuts.
 
     Raises:
-        UnclearVariable: A condition is not affine in a variable or hangs on two at once.
+        UnclearVariable: A condition is not affine in a variable, or depends on two at once.
     """
 
     columns: AtomColumns
@@ -106,12 +107,14 @@ class HiddenConditions:
     low: Numbers = field(init=False)
     high: Numbers = field(init=False)
     cuts: list[Cut] = field(init=False, default_factory=list[Cut])
-    of: dict[int, tuple[int, ...]] = field(init=False, default_factory=dict[int, tuple[int, ...]])
-    _sides: dict[int, _Sides] = field(init=False, default_factory=dict["int", "_Sides"])
-    _made: dict[int, _Comparison] = field(init=False, default_factory=dict["int", "_Comparison"])
-    _inside: dict[int, list[_Comparison]] = field(init=False, default_factory=dict["int", "list[_Comparison]"])
-    _known: dict[tuple[int, int], Truth] = field(init=False, default_factory=dict["tuple[int, int]", Truth])
-    _beside: dict[int, Mapping[int, Column]] = field(init=False, default_factory=dict["int", "Mapping[int, Column]"])
+    cuts_of: dict[int, tuple[int, ...]] = field(init=False, default_factory=dict[int, tuple[int, ...]])
+    _differences: dict[int, _Difference] = field(init=False, default_factory=dict["int", "_Difference"])
+    _comparison_of: dict[int, _Comparison] = field(init=False, default_factory=dict["int", "_Comparison"])
+    _comparisons_of: dict[int, list[_Comparison]] = field(init=False, default_factory=dict["int", "list[_Comparison]"])
+    _truths: dict[tuple[int, int], Truth] = field(init=False, default_factory=dict["tuple[int, int]", Truth])
+    _observed_parts: dict[int, Mapping[int, Column]] = field(
+        init=False, default_factory=dict["int", "Mapping[int, Column]"]
+    )
 
     def __post_init__(self) -> None:
         """Find the cuts."""
@@ -119,28 +122,28 @@ class HiddenConditions:
         ends = [support(leaf) for leaf in self.variables]
         self.low, self.high = (np.array([each[side] for each in ends]) for side in (0, 1))
         inside = [self._comparisons_in(condition) for condition in self.expanded]
-        sides = {id(each): side for found in inside for each, side in found}
+        differences = {id(each): difference for found in inside for each, difference in found}
         for variable, (low, high) in enumerate(ends):
-            mine = [each for each in sides.values() if each.variable == variable]
-            for each, equal in zip(mine, _snapped([each.equal for each in mine], (low, high)), strict=True):
-                each.equal = equal
-        made = {id(each): self._comparison(each, sides[id(each)]) for found in inside for each, _ in found}
+            mine = [each for each in differences.values() if each.variable == variable]
+            for each, root in zip(mine, _merge_close([each.root for each in mine], (low, high)), strict=True):
+                each.root = root
+        made = {id(each): self._comparison(each, differences[id(each)]) for found in inside for each, _ in found}
         for number, found in enumerate(inside):
             if found:
-                self._inside[number] = [made[key] for key in dict.fromkeys(id(each) for each, _ in found)]
-                self.of[number] = tuple(cut for each in self._inside[number] for cut in each.cuts)
-                if len(self.of[number]) > LIMITS.condition_cuts:
+                self._comparisons_of[number] = [made[key] for key in dict.fromkeys(id(each) for each, _ in found)]
+                self.cuts_of[number] = tuple(cut for each in self._comparisons_of[number] for cut in each.cuts)
+                if len(self.cuts_of[number]) > LIMITS.condition_cuts:
                     raise UnclearVariable("too many values of random variables to tell apart")
 
     def truth(self, number: int, places: NDArray[np.int64] | slice, sides: Mapping[int, NDArray[np.bool_]]) -> Truth:
-        """The value of a condition at some places.
+        """The value of a condition at some samples.
 
         Args:
-            number: Its number.
-            places: The places.
-            sides: For each of its cuts whether the hidden number is on the upper side, at each of these places.
+            number: The number of the condition.
+            places: The samples.
+            sides: For each of its cuts whether the variable is on the upper side, at each of these samples.
         """
-        cuts = self.of[number]
+        cuts = self.cuts_of[number]
         pattern = np.zeros(len(sides[cuts[0]]), np.int64)
         for place, cut in enumerate(cuts):
             pattern += sides[cut].astype(np.int64) << place
@@ -150,15 +153,15 @@ class HiddenConditions:
             found[mine] = self._column(number, each)[places][mine]
         return found
 
-    def possible(self, number: int) -> tuple[int, Numbers, Numbers] | None:
-        """The variable of a condition, and between which values of it the condition may hold at each place.
+    def possible_range(self, number: int) -> tuple[int, Numbers, Numbers] | None:
+        """The variable of a condition, and the range of its values for which the condition may hold at each sample.
 
-        Both ends are included; the lower one is above the other where there are none. None where it hangs on several.
+        Both ends are included; an empty range has its lower end above the upper one. None for several variables.
 
         Args:
-            number: The condition's number.
+            number: The number of the condition.
         """
-        cuts = sorted(self.of[number])
+        cuts = sorted(self.cuts_of[number])
         variables = {self.cuts[cut].variable for cut in cuts}
         if len(variables) > 1 or len(cuts) > LIMITS.jump_cuts:
             return None
@@ -174,19 +177,19 @@ class HiddenConditions:
         return variables.pop(), low, high
 
     def _column(self, number: int, pattern: int) -> Truth:
-        """The value of a condition at all places, with its cuts' sides as bits."""
-        if (number, pattern) not in self._known:
-            upper = {cut for place, cut in enumerate(self.of[number]) if pattern >> place & 1}
-            given = {**self._beside_of(number)}
-            for each in self._inside[number]:
+        """The value of a condition at all samples; a bit of the pattern says that its cut's upper side is meant."""
+        if (number, pattern) not in self._truths:
+            upper = {cut for place, cut in enumerate(self.cuts_of[number]) if pattern >> place & 1}
+            given = {**self._observed_parts_of(number)}
+            for each in self._comparisons_of[number]:
                 value = each.values[sum(cut in upper for cut in each.cuts)]
                 given[id(each.node)] = Column(value, each.status)
-            self._known[number, pattern] = self.columns.assuming(given).truth_of(self.expanded[number])
-        return self._known[number, pattern]
+            self._truths[number, pattern] = self.columns.assuming(given).truth_of(self.expanded[number])
+        return self._truths[number, pattern]
 
-    def _beside_of(self, number: int) -> Mapping[int, Column]:
-        """The values of the parts of a condition that hang on no hidden number, by the ids of their nodes."""
-        if number not in self._beside:
+    def _observed_parts_of(self, number: int) -> Mapping[int, Column]:
+        """The values of the parts of a condition that depend on no hidden variable, by the ids of their nodes."""
+        if number not in self._observed_parts:
             found: dict[int, Column] = {}
             stack = [self.expanded[number]]
             while stack:
@@ -197,54 +200,56 @@ class HiddenConditions:
                         found[id(node)] = column
                 elif isinstance(node, Logic):
                     stack += children(node)
-            self._beside[number] = found
-        return self._beside[number]
+            self._observed_parts[number] = found
+        return self._observed_parts[number]
 
-    def _comparisons_in(self, condition: Node) -> list[tuple[Compare, _Sides]]:
-        """The comparisons of a condition with hidden numbers."""
-        found: list[tuple[Compare, _Sides]] = []
+    def _comparisons_in(self, condition: Node) -> list[tuple[Compare, _Difference]]:
+        """The comparisons of a condition with hidden variables."""
+        found: list[tuple[Compare, _Difference]] = []
         for variable, leaf in enumerate(self.variables):
             for node in comparisons_of(leaf, [condition]):
                 if any(each.identity is not leaf.identity for each in leaves(node)):
                     raise UnclearVariable("a comparison of two hidden random variables over time")
-                if id(node) not in self._sides:
-                    self._sides[id(node)] = _Sides(variable, *affine_sides(self.columns, leaf, node))
-                found.append((node, self._sides[id(node)]))
+                if id(node) not in self._differences:
+                    self._differences[id(node)] = _Difference(variable, *affine_sides(self.columns, leaf, node))
+                found.append((node, self._differences[id(node)]))
         return found
 
-    def _comparison(self, node: Compare, sides: _Sides) -> _Comparison:
-        """A comparison with its cuts, which are added."""
-        if id(node) in self._made:
-            return self._made[id(node)]
-        at_0, rising, beyond = sides.at_0, sides.slope > 0, np.nextafter(sides.equal, np.inf)
-        there = np.isfinite(at_0) & np.isfinite(sides.slope) & ~sides.unknown
-        turns = there & (sides.slope != 0)
+    def _comparison(self, node: Compare, difference: _Difference) -> _Comparison:
+        """Add the cuts of a comparison, and keep it with them."""
+        if id(node) in self._comparison_of:
+            return self._comparison_of[id(node)]
+        at_zero, rising, beyond = difference.at_zero, difference.slope > 0, np.nextafter(difference.root, np.inf)
+        there = np.isfinite(at_zero) & np.isfinite(difference.slope) & ~difference.unknown
+        turns = there & (difference.slope != 0)
         if node.op in (CompareOp.EQ, CompareOp.NE):
             same = node.op is CompareOp.EQ
-            constant = (at_0 == 0) == same
-            ends = (sides.equal, beyond)
-            values = [np.full(len(at_0), each) for each in (not same, same, not same)]
+            constant = (at_zero == 0) == same
+            ends = (difference.root, beyond)
+            values = [np.full(len(at_zero), each) for each in (not same, same, not same)]
         else:
             # `>` and `<=` turn where both sides are no longer equal, `>=` and `<` where they are
             strict = node.op in (CompareOp.GT, CompareOp.LE)
             positive = node.op in (CompareOp.GT, CompareOp.GE)
-            constant = (at_0 > 0 if strict else at_0 >= 0) == positive
-            ends = (np.where(rising == strict, beyond, sides.equal),)
+            constant = (at_zero > 0 if strict else at_zero >= 0) == positive
+            ends = (np.where(rising == strict, beyond, difference.root),)
             values = [~rising == positive, rising == positive]
         first = len(self.cuts)
-        self.cuts += [Cut(sides.variable, np.where(turns, each, np.inf)) for each in ends]
-        status = np.where(sides.unknown, UNOBSERVED, np.where(there, DEFINED, UNDEFINED))
+        self.cuts += [Cut(difference.variable, np.where(turns, each, np.inf)) for each in ends]
+        status = np.where(difference.unknown, UNOBSERVED, np.where(there, DEFINED, UNDEFINED))
         cuts = tuple(range(first, len(self.cuts)))
-        self._made[id(node)] = _Comparison(node, cuts, [np.where(turns, each, constant) for each in values], status)
-        return self._made[id(node)]
+        self._comparison_of[id(node)] = _Comparison(
+            node, cuts, [np.where(turns, each, constant) for each in values], status
+        )
+        return self._comparison_of[id(node)]
 
 
-def _snapped(values: Sequence[Numbers], ends: tuple[float, float]) -> list[Numbers]:
-    """Numbers of which those become one that rounding alone tells apart, from each other or from the ends.
+def _merge_close(values: Sequence[Numbers], ends: tuple[float, float]) -> list[Numbers]:
+    """Replace values that differ only by rounding by one value, or by the end next to them.
 
     Args:
-        values: The numbers.
-        ends: They take the place of what is next to them.
+        values: The values.
+        ends: The ends of the variable's range.
     """
     every = np.concatenate([*values, np.array(ends)])
     order = np.argsort(every, kind="stable")

@@ -84,7 +84,7 @@ class HiddenRuns:
             whole = np.arange(int(places.start), int(places.stop), dtype=np.int64)
             one = stretches.some(whole)
             own = self._of_stretch(one, AtomColumns(self.scenario, one.places, start=one.heads()), expanded, remember)
-            parts.append(own.at(np.arange(int(mine.start), int(mine.stop)), whole))
+            parts.append(own.renumbered(np.arange(int(mine.start), int(mine.stop)), whole))
         return Runs.joined(parts)
 
     def _of_stretch(
@@ -103,7 +103,7 @@ class HiddenRuns:
         every, parts = np.arange(len(stretch)), list[Runs]()
         for start, number in enumerate(cast("list[int]", stretch.numbers.tolist())):
             own = self._by_examples(stretch.beginning(start), columns, expanded, remember(number), reason)
-            parts.append(own.at(np.array([start]), every))
+            parts.append(own.renumbered(np.array([start]), every))
         return Runs.joined(parts)
 
     def _by_values(
@@ -118,14 +118,14 @@ class HiddenRuns:
         which = possible.any
         if which.all():
             return self._within(stretches, columns, expanded, remember, hidden, (possible.low, possible.high))
-        lost = Runs.lost(stretches.starts).some(~which)
+        lost = Runs.failed_at_start(stretches.starts).some(~which)
         if not which.any():
             return lost
         some, chosen = stretches.only(which)
         own = AtomColumns(self.scenario, some.places, start=some.heads())
         limits = possible.low[which], possible.high[which]
         part = self._within(some, own, expanded, remember, HiddenConditions(own, expanded), limits)
-        return Runs.joined([part.at(np.flatnonzero(which), chosen), lost])
+        return Runs.joined([part.renumbered(np.flatnonzero(which), chosen), lost])
 
     def _within(
         self, stretches: Stretches, columns: AtomColumns, expanded: Sequence[Node],
@@ -140,19 +140,19 @@ class HiddenRuns:
         doubted = thin & (pieces.truth == TRUE)
         if not joint:
             # where other values prove the same, nothing hangs on these
-            end = pieces.of * (int(pieces.ends.max(initial=0)) + 1) + pieces.ends
+            end = pieces.owner * (int(pieces.ends.max(initial=0)) + 1) + pieces.ends
             doubted &= ~np.isin(end, end[~thin & (pieces.truth == TRUE)])
         self._confirm(pieces, np.flatnonzero(doubted), stretches, expanded, hidden)
         look()
-        order = np.lexsort((*pieces.low.T[::-1], thin, -pieces.ends, -pieces.truth.astype(np.int64), pieces.of))
-        firsts = np.flatnonzero(np.diff(pieces.of[order], prepend=-1))
+        order = np.lexsort((*pieces.low.T[::-1], thin, -pieces.ends, -pieces.truth.astype(np.int64), pieces.owner))
+        firsts = np.flatnonzero(np.diff(pieces.owner[order], prepend=-1))
         every = np.arange(len(stretches.starts))
         if joint:
             found = self._again(pieces, order, firsts, hidden, joint, stretches, remember)
-            return found.at(every, np.arange(len(stretches)))
+            return found.renumbered(every, np.arange(len(stretches)))
         matches = order[pieces.truth[order] == TRUE]
         # one piece for each end
-        new = (np.diff(pieces.of[matches], prepend=-1) != 0) | (np.diff(pieces.ends[matches], prepend=-1) != 0)
+        new = (np.diff(pieces.owner[matches], prepend=-1) != 0) | (np.diff(pieces.ends[matches], prepend=-1) != 0)
         kept = np.zeros(len(pieces), np.bool_)
         kept[order[firsts]] = kept[matches[new]] = True
         for number, each in enumerate(cast("list[int]", matches[new].tolist())):
@@ -160,7 +160,7 @@ class HiddenRuns:
                 look()
             pieces.details[each] = "", _Witness(hidden, pieces, each)
         look()
-        return pieces.some(order[kept[order]]).at(every, np.arange(len(stretches)))
+        return pieces.some(order[kept[order]]).renumbered(every, np.arange(len(stretches)))
 
     def _confirm(
         self, pieces: Runs, doubted: NDArray[np.intp], stretches: Stretches, expanded: Sequence[Node],
@@ -169,7 +169,7 @@ class HiddenRuns:
         """Follow some runs again with a value each; what is no match then is none."""
         for each in cast("list[int]", doubted.tolist()):
             look()
-            start = int(pieces.of[each])
+            start = int(pieces.owner[each])
             one = stretches.alone(start)
             own = AtomColumns(self.scenario, one.places, _values(hidden, pieces, each), start=one.heads())
             run = self._run(one, own, expanded, {})
@@ -228,7 +228,7 @@ class HiddenRuns:
         """
         best = order[firsts]
         open_ = np.flatnonzero(pieces.truth[best] != FALSE)
-        stretch_of = np.searchsorted(stretches.bounds, stretches.starts[pieces.of[best[open_]]], side="right")
+        stretch_of = np.searchsorted(stretches.bounds, stretches.starts[pieces.owner[best[open_]]], side="right")
         before = np.arange(len(open_)) - np.searchsorted(stretch_of, stretch_of)
         asked = open_[before < LIMITS.joint_starts]
         rest = open_[before >= LIMITS.joint_starts]
@@ -240,10 +240,10 @@ class HiddenRuns:
         for each in cast("list[int]", asked.tolist()):
             look()
             group = order[firsts[each] : ends[each]]
-            number = int(stretches.numbers[pieces.of[group[0]]])
+            number = int(stretches.numbers[pieces.owner[group[0]]])
             found.append(self._jointly(remember(number), pieces, group, hidden, joint))
         runs = Runs.joined(found)
-        return runs.some(np.argsort(runs.of, kind="stable"))
+        return runs.some(np.argsort(runs.owner, kind="stable"))
 
     def _jointly(
         self, start: Remembered, pieces: Runs, group: NDArray[np.int64], hidden: HiddenConditions, joint: Sequence[int]

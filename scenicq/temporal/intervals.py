@@ -192,12 +192,12 @@ class IntervalMatcher:
 
             for stretches in stretches_of(own, self.options.gap_s, apart=program.apart, classes=self.match.classes):
                 for some, runs in self._followed(program, stretches, own, remembered):
-                    parts.append(runs.at(which[some.numbers], some.labels))
+                    parts.append(runs.renumbered(which[some.numbers], some.labels))
         if not parts:
             return Reported([])
         look()
         found = Runs.joined(parts)
-        found = replace(found, truth=np.minimum(found.truth, np.where(table.sure[found.of], TRUE, UNKNOWN)))
+        found = replace(found, truth=np.minimum(found.truth, np.where(table.sure[found.owner], TRUE, UNKNOWN)))
         return self._reported(found, table, order, bindings, every=every)
 
     def _unknown(self, table: StartTable, reason: str) -> Reported:
@@ -256,7 +256,7 @@ class IntervalMatcher:
         times = table.block.times_us
         lasting = (times[ends] - times[starts]) / 1e6
         least = self.options.min_duration_s or 0.0
-        own = bindings[found.of]
+        own = bindings[found.owner]
         count = len(np.unique(own))
         fit = (truth > FALSE) & (lasting >= least - 1e-6)
         # of most bindings no interval or one is in question
@@ -291,12 +291,20 @@ class IntervalMatcher:
         recordings = block.recording_of[runs.starts]
         firsts = np.array([first for first, _ in block.runs], dtype=np.int64)[recordings]
         tracks = [
-            [(index, key) for key in block.keys(members[runs.of])] for index, members in sorted(table.members.items())
+            [(index, key) for key in block.keys(members[runs.owner])]
+            for index, members in sorted(table.members.items())
         ]
-        columns = (runs.starts - firsts, runs.ends - firsts, runs.truth, recordings, order[runs.of], runs.cut_off)
-        outcomes = [self.outcomes[each] for each in cast("list[int]", table.outcomes[runs.of].tolist())]
+        columns = (
+            runs.starts - firsts,
+            runs.ends - firsts,
+            runs.truth,
+            recordings,
+            order[runs.owner],
+            runs.cut_off,
+        )
+        outcomes = [self.outcomes[each] for each in cast("list[int]", table.outcomes[runs.owner].tolist())]
         rows = zip(*(each.tolist() for each in columns), strict=True)
-        sure = cast("list[bool]", table.sure[runs.of].tolist())
+        sure = cast("list[bool]", table.sure[runs.owner].tolist())
         details = cast("list[Detail | None]", runs.details.tolist())
         broken = cast("list[Span | None]", runs.broken.tolist())
         nothing: Detail = "", {}
@@ -358,7 +366,7 @@ def _tell_budget(runs: Runs, stretches: Stretches, columns: AtomColumns) -> None
     limited = runs.undecided.copy()
     for undecided in columns.undecided:
         before = np.concatenate(([0], np.cumsum(undecided)))
-        limited |= before[stretches.ends()[runs.of] + 1] > before[stretches.starts[runs.of]]
+        limited |= before[stretches.ends()[runs.owner] + 1] > before[stretches.starts[runs.owner]]
     for each in np.flatnonzero(limited & (runs.truth == UNKNOWN)).tolist():
         runs.details[each] = runs.details[each] or ("budget", {})
 
@@ -392,4 +400,4 @@ def _static(stretches: Stretches, table: StartTable) -> Runs:
         np.searchsorted(stretches.starts, stretches.bounds[np.searchsorted(stretches.bounds, first, side="right")]) - 1
     )
     runs = Runs.unknown(first, end)
-    return replace(runs, of=np.minimum(number, last), truth=truth)
+    return replace(runs, owner=np.minimum(number, last), truth=truth)

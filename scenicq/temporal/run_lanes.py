@@ -119,7 +119,7 @@ def _together(steps: RunSteps) -> Runs:
         found.put(on, found.some(on).then(found.some(later)))
         successor[on] = successor[later]
     runs = _runs_of(steps, found.some(numbers[0][steps.starts].astype(np.int64)), np.arange(len(steps.which)))
-    return replace(runs, of=steps.which)
+    return replace(runs, owner=steps.which)
 
 
 def _apart(steps: RunSteps, possible: tuple[Numbers, Numbers] | None) -> Runs:
@@ -178,7 +178,7 @@ def _apart(steps: RunSteps, possible: tuple[Numbers, Numbers] | None) -> Runs:
     order = np.argsort(of, kind="stable")
     of, notes = of[order], Notes.joined([each[1] for each in over]).some(order)
     runs, ended = _runs_of(steps, notes, of), Ahead.joined([each[2] for each in over]).some(order)
-    return replace(runs, of=steps.which[of], low=ended.low, high=ended.high)
+    return replace(runs, owner=steps.which[of], low=ended.low, high=ended.high)
 
 
 def _runs_of(steps: RunSteps, notes: Notes, of: NDArray[np.int64]) -> Runs:
@@ -188,7 +188,7 @@ def _runs_of(steps: RunSteps, notes: Notes, of: NDArray[np.int64]) -> Runs:
 
 def _open(steps: RunSteps, notes: Notes, of: NDArray[np.int64]) -> Runs:
     """Runs of a program without an end."""
-    runs = Runs.lost(steps.starts[of])
+    runs = Runs.failed_at_start(steps.starts[of])
     for level, ends in ((UNKNOWN, notes.possible), (TRUE, notes.sure)):
         held = ends >= 0
         runs.truth[held], runs.ends[held] = level, ends[held]
@@ -205,7 +205,7 @@ def _closed(steps: RunSteps, notes: Notes, of: NDArray[np.int64]) -> Runs:
     matches, cut = notes.sure >= 0, notes.going
     several = notes.first_match < notes.sure
     unclear = matches & (several | (notes.failed >= 0) | cut | notes.undecided) | notes.undecided
-    runs = Runs.lost(steps.starts[of])
+    runs = Runs.failed_at_start(steps.starts[of])
     runs.ends[:] = np.maximum(notes.sure, notes.failed)
     runs.truth[matches] = TRUE
     runs.truth[unclear] = UNKNOWN

@@ -111,7 +111,7 @@ class RunSteps:
         limit_s = self.machine.dynamics.time_limit_s
         self.limited = limit_s is not None and math.isfinite(limit_s)
         self.due = times_out(stretches, limit_s)[which]
-        self._of = {} if self.hidden is None else self.hidden.of
+        self._of = {} if self.hidden is None else self.hidden.cuts_of
         known = [number for number in self.machine.atoms if number not in self._of]
         truths = [self.atom(Atom(number)) for number in known]
         code = np.zeros(len(stretches), np.int64)

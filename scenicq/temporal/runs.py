@@ -27,11 +27,11 @@ Places = NDArray[np.int64]
 
 
 def later_sample(seconds: NDArray[np.float64], here: int, after_s: float) -> int:
-    """The first sample so many seconds after one of a stretch, and at least the next one.
+    """The first sample at least `after_s` seconds later than sample `here`; never `here` itself.
 
     Args:
-        seconds: Times of the samples of the stretch, ascending.
-        here: The number of the sample.
+        seconds: Times of the samples of a stretch, ascending.
+        here: The number of a sample.
         after_s: Seconds.
     """
     return max(here + 1, int(np.searchsorted(seconds, float(seconds[here]) + after_s - SLACK_S)))
@@ -39,23 +39,26 @@ def later_sample(seconds: NDArray[np.float64], here: int, after_s: float) -> int
 
 @dataclass(frozen=True, slots=True)
 class Runs:
-    """What became of runs, side by side; a start has several where other values of hidden numbers make others of it.
+    """What became of m runs, side by side.
+
+    One start has several runs if hidden random variables split it: each run then holds for one range of their values.
+    A *place* is the number of a sample among all that are followed at once.
 
     Attributes:
-        of: The number of the start of each, shape (m,).
-        starts: First places.
-        ends: Last places; of a run that is no match, how far it came.
-        truth: Whether they match.
-        broken: What keeps each from matching, as an array of `Span | None`; None where nothing does, and where it is
-            cut off before a requirement is lost for good.
-        cut_off: Whether the samples are over before the program ends.
-        open_: Whether a later end is not excluded: of a match that what is unknown may let go on.
-        undecided: Whether there are too many ways in which they may go on.
-        details: What else is known of each, as an array of `Detail | None`.
-        low, high: Between which values of each hidden number, both included, shape (m, variables).
+        owner: The number of the start of each run, shape (m,).
+        starts: The place of the first sample.
+        ends: The place of the last sample; of a run that does not match, the last one that it reached.
+        truth: Whether the run matches.
+        broken: What keeps it from matching, as an array of `Span | None`; None if nothing does, or if the samples end
+            before a requirement is lost for good.
+        cut_off: Whether the samples end before the program does.
+        open_: Whether the run matches, and unknown samples after its end could make the match longer.
+        undecided: Whether it was given up, because it branched more often than a limit allows.
+        details: What else is known of it, as an array of `Detail | None`.
+        low, high: The range of each hidden variable, both ends included, shape (m, variables).
     """
 
-    of: NDArray[np.int64]
+    owner: NDArray[np.int64]
     starts: Places
     ends: Places
     truth: Truth
@@ -69,11 +72,11 @@ class Runs:
 
     def __len__(self) -> int:
         """The number of runs."""
-        return len(self.of)
+        return len(self.owner)
 
     @classmethod
     def unknown(cls, starts: Places, ends: Places) -> Runs:
-        """Runs of which nothing is known, one for each start."""
+        """Runs about which nothing is known, one for each start."""
         m = len(starts)
         broken, details = np.full((2, m), None, dtype=object)
         a, b, c = np.zeros((3, m), np.bool_)
@@ -81,36 +84,36 @@ class Runs:
         return cls(np.arange(m), starts, ends, np.full(m, UNKNOWN), broken, a, b, c, details, none, none)
 
     @classmethod
-    def lost(cls, starts: Places) -> Runs:
-        """Runs that are no matches and come no further than their starts."""
+    def failed_at_start(cls, starts: Places) -> Runs:
+        """Runs that do not match and come no further than their starts."""
         found = cls.unknown(starts, starts.copy())
         found.truth[:] = FALSE
         return found
 
     @staticmethod
     def joined(parts: Sequence[Runs]) -> Runs:
-        """Some runs, then others, all of the same hidden numbers."""
+        """All runs of the parts, one part after the other; their hidden variables must be the same."""
         return Runs(*(np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(Runs)))
 
     def some(self, which: NDArray[np.int64] | NDArray[np.bool_]) -> Runs:
-        """Some of them."""
+        """The runs at these indices, or under this mask."""
         return Runs(*(getattr(self, each.name)[which] for each in fields(self)))
 
-    def at(self, numbers: NDArray[np.int64], places: Places) -> Runs:
-        """The same among other starts and places, whatever the hidden numbers are.
+    def renumbered(self, numbers: NDArray[np.int64], places: Places) -> Runs:
+        """These runs with starts and places numbered anew, and without the ranges of hidden variables.
 
         Args:
             numbers: The new number of each start.
             places: The new number of each place.
         """
         none = np.empty((len(self), 0))
-        own, first, last = numbers[self.of], places[self.starts], places[self.ends]
-        return replace(self, of=own, starts=first, ends=last, low=none, high=none)
+        own, first, last = numbers[self.owner], places[self.starts], places[self.ends]
+        return replace(self, owner=own, starts=first, ends=last, low=none, high=none)
 
     def with_detail(
         self, reason: str, witness: Mapping[str, WitnessValue] | None = None, truth: int | None = None
     ) -> Runs:
-        """The same with why they are unknown, or the values that prove them, and another truth value if it is given."""
+        """These runs with the reason why they are unknown, or the values that prove them, and perhaps another truth."""
         details = np.full(len(self), None, dtype=object)
         details.fill((reason, witness or {}))
         values = self.truth if truth is None else np.full(len(self), truth, np.int8)

@@ -166,8 +166,9 @@ def _widest(cases: BoxSet, below: Sequence[Leaf]) -> tuple[float, Identity, int]
 def _halves(cases: BoxSet, identity: Identity, axis: int) -> list[BoxSet]:
     """The cases over either half of a range."""
     found: list[BoxSet] = []
-    for first in range(0, cases.size, _AT_ONCE // 2):
-        some = np.arange(first, min(first + _AT_ONCE // 2, cases.size))
+    half = max(_AT_ONCE // 2, 1)
+    for first in range(0, cases.size, half):
+        some = np.arange(first, min(first + half, cases.size))
         parts = cases.take(np.tile(some, 2))
         ends = parts.ranges[identity].reshape(-1, 2, parts.size)[axis]
         middle = ends.mean(axis=0)

@@ -39,7 +39,7 @@ def test_scenarios_run_as_scenic_runs_them(seed: int) -> None:
             lambda atom, columns=columns: columns[atom.number].copy(),
         )  # fmt: skip
         for start in range(N):
-            mine = runs.some(np.flatnonzero(runs.of == start))
+            mine = runs.some(np.flatnonzero(runs.owner == start))
             assert not mine.undecided.any()
             assert (mine.truth != UNKNOWN).all(), (text, start)
             sure = {int(end) for end, truth in zip(mine.ends, mine.truth, strict=True) if truth == TRUE}

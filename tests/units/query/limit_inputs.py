@@ -371,7 +371,7 @@ def about_fields(stores: Stores, **_: object) -> Facts:
     rng = random.Random(1)
     with pytest.MonkeyPatch.context() as patch:
         # no witness is found by trial before
-        patch.setattr(field_solver, "find_witness", lambda *_: None)
+        patch.setattr(field_solver, "find_witness", lambda *_, **__: None)
         for number in range(2):
             field, value = patchwork(rng, 4), rng.uniform(0.5, 5.5)
             cars = [Beside(field, rng.uniform(0.0, 3 * SIDE - 2.0), k, 12.0) for k in range(rng.choice((2, 3)))]

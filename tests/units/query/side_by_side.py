@@ -141,7 +141,10 @@ class SideBySide:
             labels = self._of(block, motion=world.motion)
             return np.full(len(labels), -1, np.int16), {label.frame: Candidate(label, None) for label in labels}
         missed = run_prefilter(self.dataset, self._connection, world.plan, block)
-        left = candidates(self._connection, world.plan, motion=world.motion) if (missed < 0).any() else ()
+        if not (missed < 0).any():
+            return missed, {}
+        recorded, whole = self.dataset.recorded, world.whole
+        left = candidates(self._connection, world.plan, motion=world.motion, recorded=recorded, whole=whole)
         return missed, {each.label.frame: each for each in left}
 
     def _decide(

@@ -87,7 +87,10 @@ def test_the_map_counts_where_it_is_there(crossroads):
     assert len(found(dataset, PAIRS[0][0])) < len(found(dataset, PAIRS[0][0], map_defaults=False))
 
 
-@pytest.mark.parametrize("program", ["ego = new Car on road", "ego = new Car\nnew Car facing roadDirection"])
+AHEAD = "from scenicq.labels import ahead\nego = new Car\nnew Car on ahead(ego, 40)"
+
+
+@pytest.mark.parametrize("program", ["ego = new Car on road", "ego = new Car\nnew Car facing roadDirection", AHEAD])
 def test_what_the_program_asks_of_a_map_is_still_asked(program, mapless):
     with pytest.raises(ScenarioError) as told:
         found(mapless, program)

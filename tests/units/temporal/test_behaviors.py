@@ -34,7 +34,7 @@ def test_behaviors_do_what_scenic_does(seed: int) -> None:
         timeline = Timeline(np.array([0, N]), np.array(times), np.arange(N))
         runs = follow_runs(machine, timeline, lambda atom, columns=columns: columns[atom.number].copy())
         for start in range(N):
-            mine = runs.some(np.flatnonzero(runs.of == start))
+            mine = runs.some(np.flatnonzero(runs.owner == start))
             assert not mine.undecided.any()
             sure = {int(end) for end, truth in zip(mine.ends, mine.truth, strict=True) if truth == TRUE}
             expected = [

@@ -52,16 +52,16 @@ class HiddenSides:
     low: np.ndarray
     high: np.ndarray
     cuts: list[Cut] = field(default_factory=list)
-    of: dict[int, tuple[int, ...]] = field(default_factory=dict)
+    cuts_of: dict[int, tuple[int, ...]] = field(default_factory=dict)
     values: dict[int, np.ndarray] = field(default_factory=dict)
 
     def truth(self, number, places, sides):
-        bits = sum(sides[cut].astype(int) << n for n, cut in enumerate(self.of[number]))
+        bits = sum(sides[cut].astype(int) << n for n, cut in enumerate(self.cuts_of[number]))
         return self.values[number][bits, np.arange(self.values[number].shape[1])[places]]
 
     def with_numbers(self, number: int, numbers: list[float]) -> np.ndarray:
         """The value of a condition at all places, given the hidden numbers."""
-        sides = {cut: np.array(numbers[self.cuts[cut].variable] >= self.cuts[cut].at) for cut in self.of[number]}
+        sides = {cut: np.array(numbers[self.cuts[cut].variable] >= self.cuts[cut].at) for cut in self.cuts_of[number]}
         return self.truth(number, slice(None), sides)
 
 
@@ -69,7 +69,7 @@ def random_sides(draw: random.Random, n: int, hidden: list[int], variables: int)
     found = HiddenSides(np.full(variables, 2.0), np.full(variables, 8.0))
     for number in hidden:
         count = draw.choice([1, 1, 2])
-        found.of[number] = tuple(range(len(found.cuts), len(found.cuts) + count))
+        found.cuts_of[number] = tuple(range(len(found.cuts), len(found.cuts) + count))
         for _ in range(count):
             at = np.array([draw.choice([draw.uniform(0, 10), 4.0, 8.0, 2.0, np.inf]) for _ in range(n)])
             found.cuts.append(Cut(draw.randrange(variables), at))
@@ -105,11 +105,11 @@ def compare_pieces(draw: random.Random, programs: int, *, limited: bool = False)
             tried.append(sorted({*inner, *((a + b) / 2 for a, b in itertools.pairwise(inner))}))
         rest = list(itertools.product(*tried))
         for numbers in draw.sample(rest, min(len(rest), 60)):
-            truth = {number: hidden.with_numbers(number, list(numbers)) for number in hidden.of}
+            truth = {number: hidden.with_numbers(number, list(numbers)) for number in hidden.cuts_of}
             alone = follow_runs(machine, stretches, lambda a, t=truth, k=known: t.get(a.number, k[a.number]))
             inside = ((pieces.low <= numbers) & (numbers <= pieces.high)).all(axis=1)
             for start, place in enumerate(stretches.starts.tolist()):
-                (mine,) = np.flatnonzero(inside & (pieces.of == start)).tolist()
+                (mine,) = np.flatnonzero(inside & (pieces.owner == start)).tolist()
                 further = limited and (pieces.truth[mine] == UNKNOWN or pieces.open_[mine])
                 assert further or row(pieces, mine) == row(alone, start), (machine.dynamics, numbers, place)
                 matched += pieces.truth[mine] == TRUE
