@@ -13,7 +13,7 @@ __all__ = ["draw_modes"]
 
 _ROW, _GAP, _PAD, _LETTER, _CHANNEL = 18, 12, 8, 7.3, 12
 """Heights and widths in pixels: of a row, between boxes, of a margin, of a letter, between lines side by side."""
-_LONGEST = 96
+_LETTERS = 96
 """Letters of a row."""
 _COLOURS = ("#0b5fa5", "#a84300", "#00705a", "#8f2d75", "#6b5900", "#4b46b8", "#2f6b1f", "#00657a")
 _STYLE = (
@@ -145,4 +145,4 @@ def _text(text: str, x: float, y: float, kind: str | None = None) -> str:
 
 
 def _cut(text: str) -> str:
-    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}\N{HORIZONTAL ELLIPSIS}"
+    return text if len(text) <= _LETTERS else f"{text[: _LETTERS - 1]}\N{HORIZONTAL ELLIPSIS}"

@@ -29,7 +29,7 @@ from scenicq.temporal.outcomes import Outcome, outcomes_of, steady_value
 from scenicq.temporal.timeline import ModeSegment, timeline_of
 from scenicq.temporal.truth import Truth
 
-__all__ = ["Timelines", "mode_records"]
+__all__ = ["Timelines"]
 
 _KINDS = ("behavior", "scenario", "monitor")
 
@@ -149,7 +149,7 @@ class Timelines:
                 here = {each: truth[chosen] for each, truth in truths.items()}
                 mine = times_us[labels[chosen]]
                 run = timeline_of(scenario.dynamics, mine, here)
-                yield which, mode_records(scenario, run.segments, mine.tolist()), run.may_match
+                yield which, _mode_records(scenario, run.segments, mine.tolist()), run.may_match
 
     def _truths(
         self, variant: _Variant, scenario: Scenario, own: ResultStretches, witness: Mapping[str, WitnessValue]
@@ -179,7 +179,7 @@ def _roles(result: Result) -> frozenset[str]:
     return frozenset(cast(Match, result.verdict).correspondence)
 
 
-def mode_records(
+def _mode_records(
     scenario: Scenario, segments: Sequence[ModeSegment], times_us: Sequence[int]
 ) -> tuple[ModeRecord, ...]:
     """Modes as results have them.
