@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cache, partial
 from pathlib import Path
 from typing import Literal
 
@@ -22,30 +23,27 @@ from scenicq.lint.program import LINTED_MAPS, lint
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.constraints import build_groups, describe_constraint
 from scenicq.match.problem.preprocess import ready
-from scenicq.option_values import read_option
+from scenicq.option_values import read_values
 from scenicq.query.execution.compiled_map import about_dataset, is_about_map, program_network, read_network
 from scenicq.query.execution.never_compared import coverage
-from scenicq.query.execution.option_texts import KINDS, VERSIONS
+from scenicq.query.execution.option_texts import QUERY_OPTIONS
 from scenicq.query.execution.program_files import SiblingFiles
 from scenicq.store.atomic_files import write_whole
 from scenicq.store.dataset import Dataset
+from scenicq.store.said_values import said_types
 
 from .datasets import open_checked
 from .main import ERROR
 from .manual import Manual
+from .options import declared
 from .output import writing
 from .path_type import LOCAL_PATH
-from .programs import MAP_DEFAULTS, PARAMS, PROGRAM_TEXT, RUN_SCENARIO, SCENARIO, given_program
+from .programs import PROGRAM_TEXT, SCENARIO, given_program
 from .report import as_json, count, show
 from .streams import say
 from .user_folders import map_cache
 
-__all__ = ["check", "networks_of", "read_version"]
-
-
-def read_version(text: str | None) -> Literal[1, 2, 3] | None:
-    """The version of Scenic that `--scenic` names; None where it is to be inferred."""
-    return None if text is None else VERSIONS[text]
+__all__ = ["check", "networks_of"]
 
 
 def networks_of(
@@ -188,6 +186,7 @@ def _found(
     lacking: list[Diagnostic] = []
     rest: list[Diagnostic] = []
     compiled: list[tuple[Scenario, Network | None]] = []
+    attributes = None if asked.dataset is None else cache(partial(said_types, asked.dataset))
     for network in networks:
         try:
             loader = SiblingFiles(Path(source.name))
@@ -202,6 +201,7 @@ def _found(
                 map_defaults=asked.map_defaults,
                 scenario=asked.run_scenario,
                 params=asked.params,
+                label_attributes=attributes,
             )
         except ScenarioError as error:
             if asked.dataset is not None:
@@ -245,12 +245,10 @@ def _found(
 @click.argument("scenario", metavar="SCENARIO", type=click.Path(), required=False)
 @click.argument("dataset", metavar="[DATASET]", type=click.Path(), required=False)
 @PROGRAM_TEXT
-@RUN_SCENARIO
-@PARAMS
+@declared(QUERY_OPTIONS, "run_scenario", "params")
 @click.option("--map", "map_file", metavar="FILE", type=LOCAL_PATH, help="A GeoJSON or OpenDRIVE map.")
-@click.option("--scenic", type=click.Choice(["1", "2", "3"]), help="Version of Scenic.  [default: inferred]")
-@MAP_DEFAULTS
-@click.option("--initial", is_flag=True, help="Ignore behaviors and other dynamic parts.")
+@declared(QUERY_OPTIONS, "scenic", "map_defaults")
+@declared(QUERY_OPTIONS, "initial", help="Ignore behaviors and other dynamic parts.")
 @click.option("--forest", is_flag=True, help="Print the expression forest.")
 @click.option(
     "--modes",
@@ -260,9 +258,8 @@ def _found(
 @click.option("--draw-modes", "drawing", metavar="FILE", type=LOCAL_PATH,
               help="Draw these modes, and write them to a file: .svg.")  # fmt: skip
 @click.option("--groups", is_flag=True, help="Print the groups of jointly dependent constraints, in order.")
-@click.option("--classes", type=click.Choice(["fine", "coarse"]), default="fine",
-              help="Look at the program as `match` does with these classes.")  # fmt: skip
-@click.option("--strict", is_flag=True, help="What compiles but cannot be meant, or is never compared, is an error.")
+@declared(QUERY_OPTIONS, "classes", help="Look at the program as `match` does with these classes.")
+@declared(QUERY_OPTIONS, "strict", help="What compiles but cannot be meant, or is never compared, is an error.")
 @click.option(
     "--format",
     "format_",
@@ -288,7 +285,8 @@ def check(ctx: click.Context, scenario: str | None, dataset: str | None, *, prog
     if drawing is not None:
         details.append(_Drawing(drawing))
     try:
-        version, warnings = read_version(scenic), list[Diagnostic]()
+        read = read_values(QUERY_OPTIONS, {"scenic": scenic, "params": params})
+        version, warnings = read["scenic"], list[Diagnostic]()
         source, (target,), model = given_program(ctx, program, (scenario, dataset))
         networks = networks_of(target, map_file, source, version, warnings)
         opened = None if target is None else open_checked(target)
@@ -300,7 +298,7 @@ def check(ctx: click.Context, scenario: str | None, dataset: str | None, *, prog
             model,
             map_defaults,
             run_scenario,
-            dict(read_option("params", KINDS["params"], params)),
+            dict(read["params"]),
         )
         lines, diagnostics = _found(source, networks, version, initial, details, asked)
         diagnostics += warnings

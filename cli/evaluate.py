@@ -9,16 +9,14 @@ from __future__ import annotations
 import io
 import json
 from pathlib import Path
-from typing import BinaryIO, cast
+from typing import BinaryIO, Unpack
 
 import click
 
 from scenicq.errors import DataError, Diagnostic, plain_json
-from scenicq.evaluate.clusters import CLUSTER_KEYS
-from scenicq.evaluate.comparison import MARGIN
-from scenicq.evaluate.detection import DISTANCES, Missing
 from scenicq.evaluate.evaluation import Evaluation, ModelsEvaluation, Results, name_models
 from scenicq.evaluate.evaluation import evaluate_models as judge
+from scenicq.evaluate.evaluation_options import EVALUATION_OPTIONS, EvaluationTexts
 from scenicq.evaluate.pages import write_pages
 from scenicq.evaluate.rows import (
     COLUMNS,
@@ -31,7 +29,6 @@ from scenicq.evaluate.rows import (
     overview,
     tables,
 )
-from scenicq.option_values import MARGIN_OPTION, SCORE, SEED
 from scenicq.query.execution.option_texts import read_options
 from scenicq.query.execution.run import Query
 from scenicq.report.write import check_target
@@ -42,7 +39,7 @@ from scenicq.store.remote_path import AnyPath
 from .datasets import open_checked
 from .formats import CsvRows
 from .manual import Manual
-from .option_type import OptionType
+from .options import by_topic, declared
 from .output import choose_format, destination, writing
 from .path_type import ANY_PATH, LOCAL_PATH, chosen_file
 from .programs import read_scenario
@@ -65,10 +62,10 @@ _EXTENSIONS = {".json": "json"}
         "is compared.",
         "DATASET": "The dataset that they are of.",
     },
-    topics={
-        "What counts": {"predictions", "distance", "least_score", "missing", "simulated", "cluster", "margin", "seed"},
+    topics=by_topic(EVALUATION_OPTIONS, {
+        "What counts": {"predictions"},
         "What comes out": {"format_", "output", "report", "sensors"},
-    },
+    }),
     epilog="\b\nExamples:\n"
     "  scenicq evaluate parked.scenic dataset --predictions detections.json\n"
     "  scenicq evaluate parked.jsonl cutin.jsonl dataset --predictions detections.feather --simulated runs.csv\n"
@@ -80,24 +77,7 @@ _EXTENSIONS = {".json": "json"}
               help="Detections of a model: nuScenes results (.json), Argoverse 2 (.feather), or labels of the "
               "interchange format whose objects have a `score` (.jsonl or .parquet). Given several times, each model "
               "is also compared with those before it, on the same objects.")
-@click.option("--distance", metavar="M[,CLASS=M]", type=OptionType(DISTANCES), default="2",
-              help="Centre distance within which an object counts as found: 0.5, 1, 2 or 4 metres; for some classes "
-              "another one: 2,pedestrian=0.5.")
-@click.option("--min-score", "least_score", metavar="S", type=OptionType(SCORE),
-              help="Score from which a detection counts, but for average precision; all by default.")
-@click.option("--missing", type=click.Choice(["error", "empty", "skip"]), default="error",
-              help="What a frame without detections is: an error, a frame in which nothing was found, or left out.")
-@click.option("--simulated", metavar="FILE", type=LOCAL_PATH,
-              help="Simulated runs to set beside it: CSV with `scenario` (the name of a results file) and `failed` or "
-              "`score` (the share missed, 0 to 1). Where `recording` or `frame` says what a run rebuilds, both are "
-              "compared pair by pair, too, and simulation narrows the interval as far as it foretells what is missed.")
-@click.option("--cluster", metavar="KEY",
-              help="What errors may go by: recordings with one value of this parameter count as one, such as those of "
-              f"a drive; or `recording`.  [default: the first of {', '.join(CLUSTER_KEYS)} that all frames have, else "
-              "recording]")
-@click.option("--margin", metavar="SHARE", type=OptionType(MARGIN_OPTION), default=MARGIN,
-              help="What is missed more often by less than this counts as no worse.")
-@click.option("--seed", metavar="N", type=OptionType(SEED), default=0, help="Seed of the resamples.")
+@declared(EVALUATION_OPTIONS, *EVALUATION_OPTIONS)
 @click.option("--format", "format_", metavar="NAME", type=click.Choice(_FORMATS),
               help="table, json, csv, spreadsheet (csv without formulas) or parquet.  [default: by the extension of "
               "FILE, else table]")
@@ -105,10 +85,9 @@ _EXTENSIONS = {".json": "json"}
 @click.option("--report", metavar="DIR", type=ANY_PATH,
               help="Write a page with pictures, too, the worst frames first: DIR/index.html, also in s3://...")
 @SENSORS
-def evaluate(results: tuple[AnyPath, ...], dataset: str, *, predictions: tuple[Path, ...], distance: dict[str, float],
-             least_score: float | None, missing: str, simulated: Path | None, cluster: str | None, margin: float,
-             seed: int, format_: str | None, output: AnyPath | None, report: AnyPath | None,
-             sensors: Path | None) -> None:
+def evaluate(results: tuple[AnyPath, ...], dataset: str, *, predictions: tuple[Path, ...], format_: str | None,
+             output: AnyPath | None, report: AnyPath | None, sensors: Path | None,
+             **options: Unpack[EvaluationTexts]) -> None:
     # fmt: on
     """Say whether a model fails on the frames that match.
 
@@ -132,13 +111,7 @@ def evaluate(results: tuple[AnyPath, ...], dataset: str, *, predictions: tuple[P
         {name: _asked(each, opened) for name, each in zip(names, results, strict=True)},
         opened,
         dict(zip(name_models(predictions), predictions, strict=True)),
-        distance_m=distance,
-        least_score=least_score,
-        missing=cast("Missing", missing),
-        simulated=simulated,
-        cluster=cluster,
-        margin=margin,
-        seed=seed,
+        **options,
     )
     with destination(file) as sink, writing(file):
         _write(found, form, sink)

@@ -10,6 +10,7 @@ from scenicq.errors import DataError, Diagnostic
 from scenicq.match.matcher import Matcher
 from scenicq.match.verdict import Match, Unknown
 from scenicq.query.execution.lazy_solver import LazySolver
+from scenicq.query.execution.option_texts import QUERY_OPTIONS
 from scenicq.query.execution.run import Query
 from scenicq.query.explain.frame_explanation import explain as explain_label
 from scenicq.query.explain.frame_explanation import show_explanation
@@ -21,8 +22,7 @@ from scenicq.store.remote_path import AnyPath
 from .datasets import open_checked
 from .main import NOTHING, UNDECIDED
 from .manual import Manual
-from .match import match
-from .options import ONE_FRAME, OVER_TIME, SHARED, query_options
+from .options import ONE_FRAME, OVER_TIME, SHARED, declared, query_options
 from .path_type import ANY_PATH
 from .programs import PROGRAM_TEXT, SCENARIO, given_program
 from .remarks import remarks, show_remarks
@@ -62,6 +62,7 @@ __all__ = ["explain"]
 @click.option("--smt2", metavar="DIR", type=ANY_PATH,
               help="Write the formula of each group as SMT-LIB 2 into a folder, here or elsewhere.")  # fmt: skip
 @click.option("--exit-zero", is_flag=True, help="Exit with 0 also where the frame does not match.")
+@declared(QUERY_OPTIONS, *SHARED, *OVER_TIME)
 @click.pass_context
 def explain(
     ctx: click.Context, scenario: str | None, dataset: str | None, frame: str | None, *, program: str | None,
@@ -99,6 +100,3 @@ def explain(
             raise DataError(Diagnostic("target-unwritable", f"{smt2} cannot be written: {error.strerror}")) from None
     if not isinstance(verdict, Match) and not exit_zero:
         ctx.exit(UNDECIDED if isinstance(verdict, Unknown) else NOTHING)
-
-
-explain.params += [option for option in match.params if option.name in SHARED | OVER_TIME]

@@ -27,14 +27,14 @@ _SAMPLE = 200
 
 @dataclass(slots=True)
 class MatchSample:
-    """Some of the frames that match, each with the same chance, gathered as results come.
+    """Some of the frames or intervals that match, each with the same chance, gathered as results come.
 
     Attributes:
-        frames: Their names.
+        matches: They.
         of: How many there were.
     """
 
-    frames: list[str] = field(default_factory=list[str])
+    matches: list[Result] = field(default_factory=list[Result])
     of: int = 0
     _last: str = ""
     _draw: random.Random = field(default_factory=lambda: random.Random(0))
@@ -44,13 +44,13 @@ class MatchSample:
         with closing(results):
             for each in results:
                 # correspondences of one frame come together
-                if isinstance(each.verdict, Match) and each.frame != self._last:
+                if isinstance(each.verdict, Match) and (each.interval is not None or each.frame != self._last):
                     self._last = each.frame
                     self.of += 1
-                    if len(self.frames) < _SAMPLE:
-                        self.frames.append(each.frame)
+                    if len(self.matches) < _SAMPLE:
+                        self.matches.append(each)
                     elif (place := self._draw.randrange(self.of)) < _SAMPLE:
-                        self.frames[place] = each.frame
+                        self.matches[place] = each
                 yield each
 
 
@@ -130,19 +130,20 @@ def _defaults(query: Query) -> list[str]:
 
 
 def _alone(query: Query, sample: MatchSample) -> list[str]:
-    """How many frames match by the tolerance alone."""
-    if not sample.frames:
+    """How many matches there are by the tolerance alone."""
+    if not sample.matches:
         return []
     from scenicq.query.explain.tolerance_share import by_tolerance_alone  # noqa: PLC0415 - takes long to load
 
-    share = by_tolerance_alone(query, sample.frames, _BUDGET_S)
+    share = by_tolerance_alone(query, sample.matches, _BUDGET_S)
     told = [
         f"{number:,} by that of {what}"
         for what, number in (("positions", share.positions), ("headings", share.headings))
         if number
     ]
-    looked = f"{share.frames:,} of {sample.of:,} matches" if share.frames < sample.of else count(sample.of, "match")
-    return [f"    of {looked} by a tolerance alone: {', '.join(told)}"] if told else []
+    looked = f"{share.matches:,} of {sample.of:,} matches" if share.matches < sample.of else count(sample.of, "match")
+    began = ", at their first frames" if query.is_over_time() else ""
+    return [f"    of {looked} by a tolerance alone: {', '.join(told)}{began}"] if told else []
 
 
 def show_funnel(query: Query, elapsed_s: float, told: Collection[Diagnostic], sample: MatchSample) -> None:

@@ -8,6 +8,7 @@ import click
 from msgspec import UNSET
 
 from scenicq.exporters.forms import FORMS
+from scenicq.query.execution.option_texts import QUERY_OPTIONS
 from scenicq.query.execution.pieces import Gathered
 from scenicq.query.execution.pieces import gather as find_pieces
 from scenicq.query.execution.question_notes import noted_question
@@ -21,9 +22,10 @@ from scenicq.store.remote_path import AnyPath
 from .deliver import Wanted, deliver, exit_code
 from .formats import FORMATS, make_writer
 from .manual import OPEN, Manual
+from .options import declared
 from .output import ProgressBar, choose_format, destination, writing
 from .path_type import ANY_PATH, chosen_file
-from .selections import SORT, WHERE, tell_unclear
+from .selections import tell_unclear
 from .sources import SENSORS
 
 __all__ = ["gather"]
@@ -43,8 +45,7 @@ __all__ = ["gather"]
               help="Hand the matching frames on, too, in a new folder DIR; as for `match`.")  # fmt: skip
 @click.option("--report", metavar="DIR", type=ANY_PATH,
               help="Write a page with pictures of the matches, too: DIR/index.html.")  # fmt: skip
-@WHERE
-@SORT
+@declared(QUERY_OPTIONS, "where", "sort")
 @SENSORS
 @click.option("--exit-zero", is_flag=True, help="Exit with 0 also where nothing matches, or something is undecided.")
 @click.pass_context

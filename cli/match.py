@@ -14,18 +14,17 @@ from typing import Any
 
 import click
 
-from scenicq.compiler.temporal import REACTION_S
 from scenicq.errors import Diagnostic
 from scenicq.exporters.forms import FORMS
 from scenicq.match.verdict import Match, Unknown
 from scenicq.option_values import Amount, Count
 from scenicq.query.execution.executors import Executor, in_order, on_this_machine, resumed, usual_pieces
+from scenicq.query.execution.option_texts import QUERY_OPTIONS
 from scenicq.query.execution.result_summary import ResultSummary
 from scenicq.query.execution.results import Result, Sample
 from scenicq.query.execution.run import Query
 from scenicq.store.atomic_files import remove_folder, sole_writer
 from scenicq.store.remote_path import AnyPath
-from scenicq.temporal.interval_options import DEFAULT_GAP_S
 
 from .advise import advise, is_nearly_empty
 from .combinations import check_combination, check_over_time
@@ -37,15 +36,15 @@ from .funnel import MatchSample, show_funnel
 from .main import INTERRUPTS, UNDECIDED
 from .manual import OPEN, Manual
 from .option_type import OptionType
-from .options import DEFAULTS, TOPICS, option_type, query_options
+from .options import OVER_TIME, SHARED, by_topic, declared, query_options
 from .output import ProgressBar, choose_format
 from .path_type import ANY_PATH, chosen_file
 from .pieces import LateShardError, Shard, parse_shard, run_shard
 from .plan import show_plan
-from .programs import LANES, MAP_DEFAULTS, PARAMS, PROGRAM_TEXT, RUN_SCENARIO, SCENARIO, given_program
+from .programs import PROGRAM_TEXT, SCENARIO, given_program
 from .remarks import remarks, show_remarks
 from .report import show
-from .selections import SORT, WHERE, tell_unclear
+from .selections import tell_unclear
 from .sources import SENSORS
 
 __all__ = ["match"]
@@ -73,7 +72,17 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
         "DATASET": "A folder that `scenicq ingest` made.",
     },
     exits={0: "something matched", 1: "nothing matched (with --exit-zero: 0)", 3: f"{OPEN} (with --exit-zero: 0)"},
-    topics=TOPICS,
+    topics=by_topic(QUERY_OPTIONS, {
+        "What counts as a match": (),
+        "Over time": (),
+        "How it is decided": {"engine"},
+        "What comes out": {
+            "near", "rank", "sample", "diverse", "advised", "format_", "output", "report", "sensors", "export",
+            "explain",
+        },
+        "Long runs": {"shard", "resume"},
+        "Messages and exit code": {"exit_zero", "summary", "quiet", "help"},
+    }),
     epilog="\b\nExamples:\n"
     "  scenicq match crossing.scenic dataset --tolerance position=0.5,ego.heading=15deg\n"
     "  scenicq match crossing.scenic dataset --format ids | head\n"
@@ -84,45 +93,15 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @click.argument("scenario", metavar="SCENARIO", type=click.Path(), required=False)
 @click.argument("dataset", metavar="DATASET", type=click.Path(), required=False)
 @PROGRAM_TEXT
-@RUN_SCENARIO
-@PARAMS
-@click.option("--tolerance", metavar="LIST",
-              help="How far labels may be off, in metres, deg or rad: position=, heading=, speed= and so on; "
-              "for some objects ego.heading=15deg, Pedestrian.position=0.5; a bare size for all; or `exact`, 1e-3.  "
-              "[default: position=0.25,heading=5deg]")
-@click.option("--classes", type=option_type("classes"), default="fine",
-              help="coarse folds all vehicles into Car and all people into Pedestrian.")
-@click.option("--ego", type=option_type("ego"), default="label",
-              help="Whether the scenario's ego is the recording vehicle, or any object of its class.")
-@click.option("--radius", metavar="M", type=option_type("radius"),
-              help="Ignore objects and map farther than this from the ego, in metres.")
-@click.option("--enforce", metavar="LIST", help="Built-in requirements to enforce besides visibility: containment, "
-              "collision; `none` switches visibility off.")
-@click.option("--exact", is_flag=True, help="Every object of the frame must have a role.")
-@click.option("--solver", metavar="NAME", default="auto",
-              help="auto, dreal, portable, or a command that reads SMT-LIB 2, such as 'z3 -in'.")
-@click.option("--method", type=option_type("method"), default="auto",
-              help="smt sends everything to the solver; monolithic as one formula. The verdicts are the same.")
-@click.option("--prefilter/--no-prefilter", default=True,
-              help="Whether SQL narrows the frames first. The matches are the same.")
-@click.option("--jobs", metavar="N", type=option_type("jobs"), help="Processes that match.  [default: one a processor, "
-              "at most 8, once it is clear that it takes long; with --shard 1]")
-@click.option("--timeout", metavar="S", type=option_type("timeout"), default=DEFAULTS.timeout_s,
-              help="Seconds for one frame, the solver's included; then it is unknown.")
-@click.option("--budget", metavar="N", type=option_type("budget"), default=DEFAULTS.budget,
-              help="Steps of the search for a correspondence in one frame; then the frame is unknown.")
-@click.option("--limit", metavar="N", type=option_type("limit"), help="Stop after so many matches.")
+@declared(QUERY_OPTIONS, *SHARED, *OVER_TIME, "intervals", "prefilter", "jobs", "limit")
 @click.option("--deadline", metavar="S", type=OptionType(Amount("s", above=True)),
               help="Stop after S seconds, or 5min, 2h: what is "
               "decided by then is written, the rest is counted, and `--resume` goes on.")
-@click.option("--all", "every", is_flag=True, help="Show frames that do not match, too, each with its cause.")
-@click.option("--all-matches", is_flag=True, help="One line for each correspondence by which a frame matches, "
-              "interchangeable objects in one order only.")
+@declared(QUERY_OPTIONS, "every", "all_matches")
 @click.option("--near", metavar="K", type=OptionType(Count()), help="Show the K frames, too, that do not match but "
               "come closest, each with the tolerance under which it would; over time K recordings, each with the "
               "tolerance, the number of the program or the duration with which it would.")
-@WHERE
-@SORT
+@declared(QUERY_OPTIONS, "where", "sort")
 @click.option("--rank", is_flag=True, help="Order matches from typical to borderline: by the density with which the "
               "program generates what the label observes.")
 @click.option("--sample", metavar="N", type=OptionType(Count()), help="Show N of the matches, drawn at random.")
@@ -148,24 +127,6 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @click.option("--report", metavar="DIR", type=ANY_PATH,
               help="Write a page with pictures of the matches, too: DIR/index.html, also in s3://...")
 @SENSORS
-@click.option("--scenic", type=option_type("scenic"), help="Version of Scenic.  [default: inferred]")
-@MAP_DEFAULTS
-@LANES
-@click.option("--initial", is_flag=True, help="Ignore behaviors and other dynamic parts: match the initial scene.")
-@click.option("--behaviors", type=option_type("behaviors"), default="motion", help="What becomes of behaviors: "
-              "motion runs them and compares what they do with what is seen; guards lets every action pass; ignore "
-              "leaves them out.")
-@click.option("--reaction", metavar="S", type=option_type("reaction"), default=REACTION_S,
-              help="Seconds that an object has to do what its behavior says, at each change.")
-@click.option("--min-duration", metavar="S", type=option_type("min_duration"), help="Find intervals of at least S "
-              "seconds: of a program about one instant, those in which every frame matches with the same objects.")
-@click.option("--intervals", type=option_type("intervals"), default="longest",
-              help="Report the longest of overlapping intervals, or all of them.")
-@click.option("--gap", metavar="S", type=option_type("gap"), default=DEFAULT_GAP_S,
-              help="An object that has no label for longer than this is another one afterwards.")
-@click.option("--ignore-params", metavar="LIST", help="Global parameters that are not compared.")
-@click.option("--strict", is_flag=True, help="What the program sets and no label has is an error, not a warning; so is "
-              "all that `scenicq check` warns of.")
 @click.option("--exit-zero", is_flag=True, help="Exit with 0 also where nothing matches, or something is undecided.")
 @click.option("--summary", is_flag=True, help="Print the summary also where stderr is not a terminal.")
 @click.option("-q", "--quiet", is_flag=True, help="No progress, no summary.")
@@ -236,7 +197,7 @@ def match(ctx: click.Context, scenario: str | None, dataset: str | None, *, prog
 
     results = drawn(results) if selection is None else selection.applied(results, query.funnel, drawn)
     matching = MatchSample()
-    if summarized and not query.is_over_time():
+    if summarized:
         results = matching.gathered(results)
     came_close: list[str] = []
     with contextlib.nullcontext() if pieces is None else sole_writer(pieces):

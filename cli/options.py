@@ -1,56 +1,84 @@
-"""What the options of the command line mean to a query."""
+"""The options of commands, made from where they are declared, and what those of a query mean."""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable, Collection, Mapping
+from typing import Any, TypeVar
 
 import click
 
-from scenicq.match.options import MatchOptions
-from scenicq.option_values import OneOf
-from scenicq.query.execution.option_texts import KINDS, OptionTexts, read_options
+from scenicq.option_values import FileName, Flag, OneOf, Option, Parameters, Text
+from scenicq.query.execution.option_texts import QUERY_OPTIONS, OptionTexts, read_options
 from scenicq.query.execution.run import QueryOptions
-from scenicq.temporal.interval_options import DEFAULT_GAP_S
 
 from .option_type import OptionType
+from .path_type import LOCAL_PATH
 
-__all__ = ["DEFAULTS", "ONE_FRAME", "OVER_TIME", "SHARED", "TOPICS", "option_type", "query_options"]
+__all__ = ["ONE_FRAME", "OVER_TIME", "SHARED", "by_topic", "declared", "query_options"]
 
-DEFAULTS = MatchOptions()
-"""What counts as a match unless options say otherwise."""
-SHARED = frozenset({
-    "tolerance", "classes", "ego", "radius", "enforce", "exact", "solver", "method", "timeout", "budget", "scenic",
-    "initial", "map_defaults", "lanes", "behaviors", "reaction", "ignore_params", "strict",
-    "run_scenario", "params",
-})  # fmt: skip
+_Command = TypeVar("_Command", bound=Callable[..., Any] | click.Command)
+
+SHARED = frozenset(name for name, each in QUERY_OPTIONS.items() if each.about == "label")
 """Options of `match` that say what a match is; the others say which frames and what to show of them."""
-OVER_TIME = frozenset({"min_duration", "gap"})
+OVER_TIME = frozenset(name for name, each in QUERY_OPTIONS.items() if each.about == "interval")
 """Options of `match` that say what an interval is."""
-TOPICS = {
-    "What counts as a match": SHARED - {"solver", "method", "timeout", "budget", "strict", "behaviors", "reaction"},
-    "Over time": {"behaviors", "reaction", "min_duration", "intervals", "gap"},
-    "How it is decided": {"solver", "method", "timeout", "budget", "prefilter", "jobs", "engine"},
-    "What comes out": {
-        "limit", "every", "all_matches", "near", "where", "sort", "rank", "sample", "diverse", "advised",
-        "format_", "output", "report", "sensors", "export", "explain",
-    },
-    "Long runs": {"shard", "resume"},
-    "Messages and exit code": {"strict", "exit_zero", "summary", "quiet", "help"},
-}  # fmt: skip
-"""The options of `match` as its help lists them."""
-ONE_FRAME = {
-    "prefilter": False, "jobs": 1, "limit": None, "every": True, "all_matches": False,
-    "min_duration": None, "intervals": "longest", "gap": DEFAULT_GAP_S,
-}  # fmt: skip
-"""The rest of the options of a query about one frame."""
+ONE_FRAME = {"prefilter": False, "every": True}
+"""The other options of a query about one frame."""
 
 
-def option_type(name: str) -> click.ParamType[Any, Any]:
-    """The values of an option of a query, by its name."""
-    kind = KINDS[name]
-    return click.Choice(kind.texts) if isinstance(kind, OneOf) else OptionType(kind)
+def declared(options: Mapping[str, Option], *names: str, **changes: Any) -> Callable[[_Command], _Command]:
+    """Give a command some of the options that are declared, in the order of their declaration.
+
+    Args:
+        options: What is declared, by name.
+        names: The names of the options.
+        changes: What click is told otherwise than is declared, such as another `help`.
+    """
+
+    def decorate(command: _Command) -> _Command:
+        for name in reversed([each for each in options if each in names]):
+            command = _as_click(name, options[name], changes)(command)
+        return command
+
+    return decorate
 
 
-def query_options(given: dict[str, Any]) -> QueryOptions:
+def _as_click(name: str, option: Option, changes: Mapping[str, Any]) -> Callable[[_Command], _Command]:
+    """An option as click has it."""
+    flags = option.flags or (f"--{name.replace('_', '-')}",)
+    told: dict[str, Any] = {"help": option.help, "metavar": option.metavar, "default": option.default}
+    match option.kind:
+        case Flag() if option.default:
+            flags = (f"{flags[0]}/--no-{flags[0].removeprefix('--')}",)
+        case Flag():
+            told["is_flag"] = True
+        case OneOf(texts):
+            told["type"] = click.Choice(texts)
+        case Parameters():
+            told |= {"nargs": 2, "multiple": True, "default": ()}
+        case FileName():
+            told["type"] = LOCAL_PATH
+        case Text():
+            pass
+        case kind:
+            told["type"] = OptionType(kind)
+    return click.option(*flags, name, **{**told, **changes})
+
+
+def by_topic(options: Mapping[str, Option], others: Mapping[str, Collection[str]]) -> Mapping[str, Collection[str]]:
+    """The names of options by the heading that they stand under, as `Manual` takes them.
+
+    Args:
+        options: What is declared, by name.
+        others: Names of a command's other options by heading, in the order of the help.
+    """
+    return {
+        topic: {*names, *(name for name, each in options.items() if each.topic == topic)}
+        for topic, names in others.items()
+    }
+
+
+def query_options(given: Mapping[str, Any]) -> QueryOptions:
     """The options of a query from those of the command line."""
-    return read_options(**{name: given[name] for name in OptionTexts.__annotations__ if name in given})
+    texts: OptionTexts = {name: given[name] for name in QUERY_OPTIONS if name in given}  # pyright: ignore[reportAssignmentType]
+    return read_options(**texts)

@@ -13,19 +13,9 @@ from scenicq.query.execution.option_texts import DRIVING
 from scenicq.query.execution.program_files import read_program
 from scenicq.store.remote_path import local_path
 
-from .options import option_type
 from .path_type import check_here
 
-__all__ = [
-    "LANES",
-    "MAP_DEFAULTS",
-    "PARAMS",
-    "PROGRAM_TEXT",
-    "RUN_SCENARIO",
-    "SCENARIO",
-    "given_program",
-    "read_scenario",
-]
+__all__ = ["PROGRAM_TEXT", "SCENARIO", "given_program", "read_scenario"]
 
 SCENARIO = "A Scenic program, as a file; `-` is standard input. Not with -e."
 """What the help says of the argument."""
@@ -38,41 +28,6 @@ PROGRAM_TEXT = click.option(
     "unless it imports another.",
 )
 """The option for a program in place of the argument; see `given_program`."""
-MAP_DEFAULTS = click.option(
-    "--map-defaults/--no-map-defaults",
-    default=True,
-    help="Whether the world model places and turns what the program does not: a car on the road, along it. Without a "
-    "map it never does.",
-)
-"""The option for what plain words ask of a map; see `compile_scenario`."""
-LANES = click.option(
-    "--lanes",
-    type=option_type("lanes"),
-    default="along",
-    help="Which of several lanes that contain an object are its own, as in `ego.lane`: along, those that lead within "
-    "60 degrees of its heading or go on from the last lane of its track, and all where none does or it has no heading; "
-    "any, all of them.",
-)
-"""The option for the lanes of an object; see `compile_scenario`."""
-
-
-RUN_SCENARIO = click.option(
-    "--scenario",
-    "run_scenario",
-    metavar="NAME",
-    help="Which scenario of a program with several runs.  [default: Main, or the only one]",
-)
-"""The option for the scenario that runs; see `compile_scenario`."""
-PARAMS = click.option(
-    "-p",
-    "--param",
-    "params",
-    metavar="NAME VALUE",
-    nargs=2,
-    multiple=True,
-    help="Give a global parameter a value, whatever the program says: a number or a text. Can be given several times.",
-)
-"""The option for parameters; see `compile_scenario`."""
 
 
 def read_scenario(path: str | Path) -> Source:

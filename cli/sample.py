@@ -10,17 +10,17 @@ from scenicq.compiler.element_lookups import LaneRule
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import plain_json
 from scenicq.exporters.sample import PATIENCE_S, sample_labels, sample_record, write_sample
-from scenicq.option_values import SEED, Count, read_option
-from scenicq.query.execution.option_texts import KINDS, read_built_ins
+from scenicq.option_values import SEED, Count, read_values
+from scenicq.query.execution.option_texts import QUERY_OPTIONS, read_built_ins
 from scenicq.query.execution.program_files import SiblingFiles
 from scenicq.store.remote_path import AnyPath
 
-from .check import networks_of, read_version
+from .check import networks_of
 from .manual import Manual
 from .option_type import OptionType
-from .options import option_type
+from .options import declared
 from .path_type import ANY_PATH, LOCAL_PATH
-from .programs import LANES, MAP_DEFAULTS, PARAMS, PROGRAM_TEXT, RUN_SCENARIO, SCENARIO, given_program
+from .programs import PROGRAM_TEXT, SCENARIO, given_program
 from .streams import say
 
 __all__ = ["sample"]
@@ -39,8 +39,7 @@ __all__ = ["sample"]
 @click.argument("scenario", metavar="SCENARIO", type=click.Path(), required=False)
 @click.argument("dataset", metavar="[DATASET]", type=click.Path(), required=False)
 @PROGRAM_TEXT
-@RUN_SCENARIO
-@PARAMS
+@declared(QUERY_OPTIONS, "run_scenario", "params")
 @click.option("--map", "map_file", metavar="FILE", type=LOCAL_PATH, help="A GeoJSON or OpenDRIVE map.")
 @click.option("-n", "--number", metavar="N", type=OptionType(Count()), default=1, help="Scenes to draw.")
 @click.option("--seed", metavar="N", type=OptionType(SEED), default=0, help="The same seed gives the same scenes.")
@@ -50,17 +49,9 @@ __all__ = ["sample"]
     default="",
     help="Built-in requirements that need not hold: visibility, containment, collision.",
 )
-@click.option(
-    "--timeout",
-    metavar="S",
-    type=option_type("timeout"),
-    default=PATIENCE_S,
-    help="Seconds of the processor for one scene.",
-)
-@click.option("--scenic", type=option_type("scenic"), help="Version of Scenic.  [default: inferred]")
-@MAP_DEFAULTS
-@LANES
-@click.option("--initial", is_flag=True, help="Ignore behaviors and other dynamic parts.")
+@declared(QUERY_OPTIONS, "timeout", default=PATIENCE_S, help="Seconds of the processor for one scene.")
+@declared(QUERY_OPTIONS, "scenic", "map_defaults", "lanes")
+@declared(QUERY_OPTIONS, "initial", help="Ignore behaviors and other dynamic parts.")
 @click.option("-o", "--output", metavar="DIR", type=ANY_PATH,
               help="Write an interchange folder with labels and map, to be ingested, here or elsewhere.")  # fmt: skip
 @click.pass_context
@@ -75,7 +66,8 @@ def sample(ctx: click.Context, scenario: str | None, dataset: str | None, *, pro
     localPath('FILE')`, or else a small built-in street. One line of JSON a scene.
     """
     source, (target,), model = given_program(ctx, program, (scenario, dataset))
-    version = read_version(scenic)
+    read = read_values(QUERY_OPTIONS, {"scenic": scenic, "params": params})
+    version = read["scenic"]
     network = next(networks_of(target, map_file, source, version))
     compiled = compile_scenario(
         source,
@@ -87,7 +79,7 @@ def sample(ctx: click.Context, scenario: str | None, dataset: str | None, *, pro
         map_defaults=map_defaults,
         lanes=lanes,
         scenario=run_scenario,
-        params=dict(read_option("params", KINDS["params"], params)),
+        params=dict(read["params"]),
     )
     labels = sample_labels(compiled, number, seed, read_built_ins(waive), timeout_s=timeout)
     if output is not None:

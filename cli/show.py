@@ -13,6 +13,7 @@ from scenicq.match.verdict import Unknown
 from scenicq.option_values import HALF, WIDTH
 from scenicq.query.execution.interval_frames import verdict_at
 from scenicq.query.execution.lazy_solver import LazySolver
+from scenicq.query.execution.option_texts import QUERY_OPTIONS
 from scenicq.query.execution.run import Query
 from scenicq.query.explain.frame_explanation import explain
 from scenicq.query.explain.moments import intervals_around, named_frame
@@ -27,9 +28,8 @@ from scenicq.store.remote_path import AnyPath
 
 from .datasets import open_checked
 from .manual import Manual
-from .match import match
 from .option_type import OptionType
-from .options import ONE_FRAME, OVER_TIME, SHARED, query_options
+from .options import ONE_FRAME, OVER_TIME, SHARED, declared, query_options
 from .output import destination, writing
 from .path_type import ANY_PATH, LOCAL_PATH, chosen_file
 from .programs import read_scenario
@@ -107,6 +107,8 @@ def _shot(dataset: Dataset, label: Label, scenario: Path | None, given: dict[str
 )
 @click.option("--width", metavar="PX", type=OptionType(WIDTH), default=900, help="Width in pixels.")
 @SENSORS
+# --scenario names the program here
+@declared(QUERY_OPTIONS, *(SHARED | OVER_TIME) - {"run_scenario"})
 def show(dataset: str, frame: str, *, scenario: Path | None, output: AnyPath | None, half: float | None,
          width: int, sensors: Path | None, **given: Any) -> None:  # fmt: skip
     """Draw one frame from above: map, boxes, and what a scenario says of it.
@@ -133,7 +135,3 @@ def show(dataset: str, frame: str, *, scenario: Path | None, output: AnyPath | N
         sink.write(data)
     if file is None and results().isatty():
         say()
-
-
-# --scenario names the program here
-show.params += [option for option in match.params if option.name in (SHARED | OVER_TIME) - {"run_scenario"}]

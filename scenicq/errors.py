@@ -17,6 +17,7 @@ from functools import cached_property
 __all__ = [
     "CODES",
     "CONTROL",
+    "CannotEvaluate",
     "DataError",
     "Diagnostic",
     "Note",
@@ -277,6 +278,13 @@ class DataError(ScenicqError):
 
 class SolverError(ScenicqError):
     """A solver is missing or cannot be started."""
+
+
+class CannotEvaluate(Exception):
+    """A question that cannot be answered in the way that was tried; the message says which.
+
+    It is no error of the input: whoever asked tries another way, or leaves it unknown, never a no.
+    """
 
 
 def _columns(text: str) -> int:

@@ -1,16 +1,20 @@
-"""The values of options, as people, scripts and programs hand them over: each kind reads a text or a value of Python.
+"""Options: how they are declared, and the values that people, scripts and programs hand over.
 
-A command line, an environment variable and an argument of a function are read by the same kinds, so that what one of
-them takes, the others take, and what one refuses, the others refuse in the same words.
+A typed dictionary declares options once: the types are for Python, and each is annotated with an `Option`. The command
+line and its help, variables of the environment, arguments of functions and the words of reports are made from that. A
+kind reads a text or a value of Python, so that what one of them takes, the others take, and what one refuses, the
+others refuse in the same words.
 """
 
 from __future__ import annotations
 
 import math
 import numbers
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from typing import Any, Literal, Protocol, cast
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from functools import reduce
+from pathlib import Path
+from typing import Any, Literal, Protocol, cast, get_args, get_type_hints
 
 from scenicq.errors import DataError, Diagnostic, similar
 
@@ -25,13 +29,16 @@ __all__ = [
     "Amount",
     "Count",
     "Distances",
+    "FileName",
     "Flag",
     "OneOf",
+    "Option",
     "OptionKind",
     "Parameters",
     "Text",
+    "declared_options",
     "read_option",
-    "read_options_of",
+    "read_values",
 ]  # fmt: skip
 
 LONGEST_S = 2_000_000.0
@@ -230,6 +237,22 @@ class Text:
 
 
 @dataclass(frozen=True, slots=True)
+class FileName:
+    """A file of this machine."""
+
+    @property
+    def expected(self) -> str:
+        """What is expected, for people."""
+        return "the name of a file"
+
+    def read(self, value: Any) -> Path:
+        """The value."""
+        if not isinstance(value, str | Path):
+            raise ValueError
+        return Path(value)
+
+
+@dataclass(frozen=True, slots=True)
 class Distances:
     """One of some distances, and others for some names: `2`, `2,pedestrian=0.5` or, in Python, `{"": 2}`.
 
@@ -292,29 +315,77 @@ def read_option(name: str, kind: OptionKind, value: Any) -> Any:
         raise DataError(Diagnostic("option-invalid", f"`{name}` is {kind.expected}, not {shown}")) from None
 
 
-def read_options_of(
-    kinds: Mapping[str, OptionKind], given: Mapping[str, Any], optional: Iterable[str] = ()
-) -> dict[str, Any]:
+def _same(value: Any) -> Any:
+    return value
+
+
+@dataclass(frozen=True, slots=True)
+class Option:
+    """An option, in the annotation of a typed dictionary's key, which is its name in Python.
+
+    Attributes:
+        kind: What values it has.
+        metavar: What stands for its value in the help of the command line.
+        help: What the help says of it; "" where the command line does not have it.
+        topic: The heading that it stands under there.
+        flags: What people write, where that is not `--` and the name.
+        about: What it is about: what matches at one instant, what an interval is, or what is done with all of these.
+        field: Where its value goes, such as `match.radius`, in the object that has all of them; its name by default.
+        meaning: Makes the value of what the kind has read, or of None.
+        default: The default of the command line.
+        optional: Whether None stands for the default; so it is where the type of Python has None.
+    """
+
+    kind: OptionKind
+    metavar: str | None = None
+    help: str = ""
+    topic: str = ""
+    flags: tuple[str, ...] = ()
+    about: Literal["label", "interval", "all"] = "all"
+    field: str = ""
+    meaning: Callable[[Any], Any] = _same
+    default: Any = None
+    optional: bool = False
+
+
+def declared_options(declaration: type, defaults: object = None) -> Mapping[str, Option]:
+    """The options that a typed dictionary declares, by name.
+
+    Args:
+        declaration: The typed dictionary.
+        defaults: The object that has all defaults, if there is one: those of the command line come from it.
+    """
+    found: dict[str, Option] = {}
+    for name, annotated in get_type_hints(declaration, include_extras=True).items():
+        kind, option = cast("tuple[Any, Option]", get_args(annotated))
+        optional, field = type(None) in get_args(kind), option.field or name
+        default = option.default
+        if defaults is not None and not optional:
+            default = reduce(getattr, field.split("."), defaults)
+        found[name] = replace(option, field=field, default=default, optional=optional)
+    return found
+
+
+def read_values(options: Mapping[str, Option], given: Mapping[str, Any]) -> dict[str, Any]:
     """The values of options that are given.
 
     Args:
-        kinds: All options that there are.
+        options: All options that there are.
         given: What somebody has written, by the name of the option.
-        optional: Options for which None stands for the default.
 
     Returns:
-        The values; None where that stands for the default.
+        The values; None where that stands for the default, and has no other meaning.
 
     Raises:
         DataError: option-invalid.
     """
     for name in given:
-        if name not in kinds:
-            close = similar(name, kinds)
-            hint = f"did you mean `{close}`?" if close else f"known are {', '.join(kinds)}"
+        if name not in options:
+            close = similar(name, options)
+            hint = f"did you mean `{close}`?" if close else f"known are {', '.join(options)}"
             raise DataError(Diagnostic("option-invalid", f"there is no option `{name}`", hints=(hint,)))
-    may_lack = frozenset(optional)
-    return {
-        name: None if value is None and name in may_lack else read_option(name, kinds[name], value)
+    read = {
+        name: None if value is None and options[name].optional else read_option(name, options[name].kind, value)
         for name, value in given.items()
     }
+    return {name: options[name].meaning(value) for name, value in read.items()}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
+from contextlib import suppress
 from typing import Generic, TypeVar
 
 __all__ = ["Recent"]
@@ -21,16 +22,19 @@ class Recent(Generic[_Key, _Value]):
         self._values: OrderedDict[_Key, _Value] = OrderedDict()
 
     def get(self, key: _Key, make: Callable[[], _Value]) -> _Value:
-        """The value of a key, made where it is not there any more.
+        """The value of a key, made where it is not there any more; threads that ask at once may each make it.
 
         Args:
             key: The key.
             make: Makes the value.
         """
-        if key not in self._values:
-            value = make()
-            self._values[key] = value
-            if len(self._values) > self._most:
-                self._values.popitem(last=False)
-        self._values.move_to_end(key)
-        return self._values[key]
+        try:
+            value = self._values[key]
+        except KeyError:
+            value = self._values[key] = make()
+            while len(self._values) > self._most:
+                with suppress(KeyError):
+                    self._values.popitem(last=False)
+        with suppress(KeyError):  # another thread may have dropped it
+            self._values.move_to_end(key)
+        return value

@@ -11,6 +11,7 @@ from scenicq.compiler.coerce import property_node, to_heading, to_region, to_sca
 from scenicq.compiler.coroutines import NotBegun, ScenarioCall
 from scenicq.compiler.elements import MISSING, is_of_elements, names_of, of_element, of_network
 from scenicq.compiler.following import follow
+from scenicq.compiler.label_attributes import label_attribute
 from scenicq.compiler.lookups import look_up_of
 from scenicq.compiler.random_values import each_existing, regions_apart
 from scenicq.compiler.region_attributes import REGION_METHODS, holds_regions, of_region
@@ -21,6 +22,7 @@ from scenicq.forest import build
 from scenicq.forest.angle_wrap import one_turn
 from scenicq.forest.kinds import kind_of
 from scenicq.forest.nodes import ArithmeticOp, Node
+from scenicq.geometry.abstract_map import AbstractElement, NeedsMapError
 from scenicq.geometry.elements import Maneuver, NetworkElement, Signal
 from scenicq.geometry.network import Network
 from scenicq.limits import LIMITS
@@ -86,7 +88,7 @@ def attribute(run: Interpreter, value: ModelValue, name: str, span: Span) -> Mod
         if value is None and is_of_elements(name):
             raise fail("map-lacks", f"the map has no element here that `{name}` could be of", span, "this is of None",
                        ("leave out with a condition where there is none",))  # fmt: skip
-        raise unknown_attribute(value, name, _names(value), _PLACES.get(name.lstrip("_"), ""), span)
+        raise unknown_attribute(value, name, _names(run, value), _PLACES.get(name.lstrip("_"), ""), span)
     return found
 
 
@@ -95,10 +97,11 @@ def _of_choice(run: Interpreter, value: Choice, name: str, span: Span) -> ModelV
     return each_existing(run, value, lambda option: attribute(run, option, name, span), span)
 
 
-def _names(value: ModelValue) -> set[str]:
+def _names(run: Interpreter, value: ModelValue) -> set[str]:
     match value:
         case Instance():
-            return set(value.properties) | set(_PART_NAMES)
+            said = () if run.label_attributes is None else run.label_attributes()
+            return {*value.properties, *_PART_NAMES, *said}
         case Module():
             return set(value.names)
         case Network() | NetworkElement() | Maneuver() | Signal():
@@ -109,6 +112,8 @@ def _names(value: ModelValue) -> set[str]:
 
 def _lookup(run: Interpreter, value: ModelValue, name: str, span: Span) -> ModelValue:
     match value:
+        case AbstractElement():
+            raise NeedsMapError
         case Instance():
             return _of_instance(run, value, name, span)
         case Module():
@@ -219,7 +224,8 @@ def _of_instance(run: Interpreter, value: Instance, name: str, span: Span) -> Mo
     for cls in value.cls.ancestry():
         if name in cls.attributes:
             return cls.attributes[name]
-    return _of_node(to_vector(value, span), name, span)
+    found = _of_node(to_vector(value, span), name, span)
+    return label_attribute(run, value, name, span) if found is MISSING else found
 
 
 def _corners(value: Instance, span: Span) -> tuple[ModelValue, ...]:

@@ -26,6 +26,7 @@ __all__ = [
     "PARTIAL",
     "apart_from_height",
     "kind_of_model",
+    "observed_property",
     "property_node",
     "read_over_time",
     "to_boolean",
@@ -83,10 +84,16 @@ def property_node(instance: Instance, name: str, span: Span | None) -> ModelValu
     if instance.index is None or name in PARTIAL:
         return value
     if name in OBSERVABLE:
-        return Feature(instance.index, name, OBSERVABLE[name], _OVER_TIME.get(), span=span)
+        return observed_property(instance, name, OBSERVABLE[name], span)
     if is_node(value) and not isinstance(value, Constant):
-        return Feature(instance.index, name, kind_of(value), _OVER_TIME.get(), span=span)
+        return observed_property(instance, name, kind_of(value), span)
     return value
+
+
+def observed_property(instance: Instance, name: str, kind: Kind, span: Span | None) -> Feature:
+    """A property of an object, by reference."""
+    assert instance.index is not None
+    return Feature(instance.index, name, kind, _OVER_TIME.get(), span=span)
 
 
 def kind_of_model(value: ModelValue) -> Kind | None:

@@ -25,6 +25,7 @@ from scenicq.compiler.values import (
 from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.forest.nodes import CompareOp, Constant, Node, Select
+from scenicq.geometry.abstract_map import AbstractElement, NeedsMapError
 from scenicq.geometry.elements import Maneuver, NetworkElement
 from scenicq.syntax.hints import condition_hint
 
@@ -88,27 +89,35 @@ def _same_choice(left: ModelValue, right: ModelValue, span: Span) -> ModelValue:
         return None
     if not atoms[0] & atoms[1]:
         return False
-    codes: dict[ModelValue, float] = {
-        atom: float(code) for code, atom in enumerate(dict.fromkeys(possible_values(left)))
+    if isinstance(right, AbstractElement):
+        # what is compared is its place, which it does not tell
+        raise NeedsMapError
+    codes: dict[object, float] = {
+        atom: float(code) for code, atom in enumerate(dict.fromkeys(map(_atom, possible_values(left))))
     }
     one, other = _numbered(left, codes, span), _numbered(right, codes, span)
     return build.compare(CompareOp.EQ, one, other, span)
 
 
-def _atoms(value: ModelValue) -> set[ModelValue] | None:
+def _atom(value: ModelValue) -> object:
+    """What equal elements have in common: those that stand for any of a kind are told apart by their places alone."""
+    return ("any", value.kind) if isinstance(value, AbstractElement) else value
+
+
+def _atoms(value: ModelValue) -> set[object] | None:
     """The elements that a value may be, or None where it may be something else."""
-    found = set[ModelValue]()
+    found = set[object]()
     for each in possible_values(value):
         if each is not None and not isinstance(each, NetworkElement | Maneuver):
             return None
-        found.add(each)
+        found.add(_atom(each))
     return found
 
 
-def _numbered(value: ModelValue, codes: dict[ModelValue, float], span: Span) -> Node:
+def _numbered(value: ModelValue, codes: dict[object, float], span: Span) -> Node:
     """The number of the element that a value comes out as, where equal elements have equal numbers."""
     if not isinstance(value, Choice):
-        return build.constant(codes.setdefault(value, float(len(codes))), span)
+        return build.constant(codes.setdefault(_atom(value), float(len(codes))), span)
     numbers = tuple(_numbered(option, codes, span) for option in value.options)
     known = [number.value for number in numbers if isinstance(number, Constant)]
     return value.index if known == list(range(len(numbers))) else Select(value.index, numbers, span=span)

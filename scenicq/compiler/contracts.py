@@ -29,7 +29,7 @@ from typing import TYPE_CHECKING, cast
 from scenicq.compiler import operators
 from scenicq.compiler.coerce import property_node, read_over_time, to_heading, to_scalar, to_vector
 from scenicq.compiler.contract_bounds import BOUNDS
-from scenicq.compiler.element_lookups import LOOKUPS
+from scenicq.compiler.element_lookups import LookupTable
 from scenicq.compiler.lane_courses import dead_ends, lane_course, lanes_and_junctions
 from scenicq.compiler.values import Choice, Instance, ModelValue, describe, fail, is_node
 from scenicq.errors import Span
@@ -586,8 +586,7 @@ def _follow_lane(
 def _keeps_lane(motion: _Motion, *, against: bool = False) -> Callable[[Node], Node]:
     """The centre is where one of the lanes entered on leads to; who entered on none may be anywhere."""
     lookups, network = motion.run.lookups, motion.run.network
-    family, layers = LOOKUPS["laneAt"]
-    table = lookups.table((id(network), "laneAt"), "network.laneAt", family, lambda: layers(network))
+    table = lookups.table((id(network), "laneAt"), lambda: LookupTable.of_network(network, "laneAt"))
     lanes = (cast(Lane, each) for each in table.options)
     courses = [lane_course(motion.run, each, motion.span, against=against) for each in lanes]
     options = tuple(build.constant(each) for each in (*courses, Everywhere()))

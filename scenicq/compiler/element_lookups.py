@@ -11,6 +11,7 @@ from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.forest.nodes import ArithmeticOp, Constant, DirectionAt, Feature, Index, Node, Select
 from scenicq.geometry import shapes
+from scenicq.geometry.abstract_map import AbstractElement, AbstractNetwork, AbstractOccupancy, NeedsMapError
 from scenicq.geometry.elements import Intersection, Lane, Maneuver, NetworkElement
 from scenicq.geometry.network import Network
 from scenicq.geometry.occupancy import TOLERANCE, ElementAtPoint, Layer, Occupancy
@@ -104,15 +105,63 @@ LOOKUPS: dict[str, tuple[str, Callable[[Network], list[list[LookupEntry]]]]] = {
 """The look-ups of the network: which ranks they share, and the elements in the order in which they count."""
 
 
-class LookupTable:
-    """The elements that one look-up may give, and where each lies."""
+_OWN_AREAS = {
+    "laneAt": "lane",
+    "intersectionAt": "intersection",
+    "crossingAt": "crossing",
+    "sidewalkAt": "sidewalk",
+    "shoulderAt": "shoulder",
+}
+"""The look-ups of elements of one kind that are found in their own areas, and nowhere else."""
 
-    def __init__(self, name: str, family: str, layers: list[list[LookupEntry]]) -> None:
+
+class LookupTable:
+    """The elements that one look-up may give, and where each lies.
+
+    Attributes:
+        family: Which look-ups share ranks with it.
+        options: The elements.
+        occupancy: Where they lie.
+    """
+
+    def __init__(
+        self, family: str, options: tuple[NetworkElement | tuple[Maneuver, ...], ...], occupancy: Occupancy
+    ) -> None:
+        """Take them."""
+        self.family, self.options, self.occupancy = family, options, occupancy
+
+    @classmethod
+    def of_network(cls, network: Network, name: str) -> LookupTable:
+        """That of one of the `LOOKUPS`, which over an abstract map has an element that stands for all.
+
+        Args:
+            network: The map.
+            name: The look-up.
+        """
+        family, layers = LOOKUPS[name]
+        called = f"network.{name}"
+        if not isinstance(network, AbstractNetwork):
+            return cls.of_layers(called, family, layers(network))
+        if name not in _OWN_AREAS:
+            raise NeedsMapError
+        kind = _OWN_AREAS[name]
+        # each place has one of its own
+        options = (AbstractElement(kind),) if kind in network.kinds else ()
+        return cls(family, options, AbstractOccupancy(called, kind))
+
+    @classmethod
+    def of_layers(cls, name: str, family: str, layers: list[list[LookupEntry]]) -> LookupTable:
+        """That of some elements.
+
+        Args:
+            name: What messages call it.
+            family: Which look-ups share ranks with it.
+            layers: The elements in the order in which they count.
+        """
         found = (element for layer in layers for _, element, _ in layer if element is not None)
-        self.family = family
-        self.options: tuple[NetworkElement | tuple[Maneuver, ...], ...] = tuple(dict.fromkeys(found))
-        numbers = {element: number for number, element in enumerate(self.options)}
-        nothing = len(self.options)
+        options: tuple[NetworkElement | tuple[Maneuver, ...], ...] = tuple(dict.fromkeys(found))
+        numbers = {element: number for number, element in enumerate(options)}
+        nothing = len(options)
 
         places: list[Layer] = []
         ids: list[tuple[str, ...]] = []
@@ -132,9 +181,8 @@ class LookupTable:
                     for part, _, element, owner in parts
                 )
             )
-        self.occupancy = Occupancy(
-            tuple(places), nothing, name, tuple(ids), tuple(ways), tuple(continued), tuple(names)
-        )
+        occupancy = Occupancy(tuple(places), nothing, name, tuple(ids), tuple(ways), tuple(continued), tuple(names))
+        return cls(family, options, occupancy)
 
 
 class Lookups:
@@ -156,11 +204,12 @@ class Lookups:
         self.known: dict[tuple[int, str], Constant | None] = {}
         self.courses: dict[tuple[Lane, bool], PolygonSet] = {}
         self._kept: list[Node] = []
+        self._meant: dict[int, AbstractElement] = {}
 
-    def table(self, key: object, name: str, family: str, layers: Callable[[], list[list[LookupEntry]]]) -> LookupTable:
+    def table(self, key: object, make: Callable[[], LookupTable]) -> LookupTable:
         """The table of a look-up, made once."""
         if key not in self.tables:
-            self.tables[key] = LookupTable(name, family, layers())
+            self.tables[key] = make()
         return self.tables[key]
 
     def index(self, key: object, table: LookupTable, place: Node, going: tuple[Node, ...], span: Span) -> Node:
@@ -171,6 +220,17 @@ class Lookups:
             self._kept.append(place)
             self.indices[whose] = self._make_index(table, place, going, where, span)
         return self.indices[whose]
+
+    def options(self, table: LookupTable, index: Node) -> tuple[NetworkElement | tuple[Maneuver, ...], ...]:
+        """What may lie at a place.
+
+        Args:
+            table: The options.
+            index: Which of them lies there.
+        """
+        if not isinstance(table.occupancy, AbstractOccupancy):
+            return table.options
+        return (self._meant.setdefault(id(index), AbstractElement(table.occupancy.kind)),)
 
     def numbers(
         self, table: LookupTable, place: Node, span: Span, count: int | None = None, going: tuple[Node, ...] = ()

@@ -31,6 +31,7 @@ from scenicq.compiler.exclusions import Exclusions
 from scenicq.compiler.expressions import evaluate
 from scenicq.compiler.items import items_of
 from scenicq.compiler.known_properties import known_truth
+from scenicq.compiler.label_attributes import LabelAttributes
 from scenicq.compiler.logic import condition
 from scenicq.compiler.overrides import override
 from scenicq.compiler.recorded_values import RecordStatement, record_statement
@@ -94,6 +95,7 @@ class Interpreter:
         network: The road network.
         gap_s: Seconds without a label at which the course of a track is cut.
         lanes: Which of several lanes that contain an object are its own.
+        label_attributes: What kinds of values labels have under the name of each attribute; None without a dataset.
         budget: What the program may still use.
         objects: The objects made so far.
         records: What results are to carry.
@@ -116,6 +118,7 @@ class Interpreter:
     network: Network
     gap_s: float = GAP_S
     lanes: LaneRule = "along"
+    label_attributes: LabelAttributes | None = None
     budget: Budget = field(default_factory=Budget)
     objects: list[Instance] = field(default_factory=list[Instance])
     requirements: list[RequireStatement] = field(default_factory=list[RequireStatement])

@@ -81,8 +81,7 @@ def look_up(
     Raises:
         ScenarioError: impossible-requirement, where there is no element at a known place but must be.
     """
-    family, layers = LOOKUPS[name]
-    table = run.lookups.table((id(network), name), f"network.{name}", family, lambda: layers(network))
+    table = run.lookups.table((id(network), name), lambda: LookupTable.of_network(network, name))
     known = getattr(network, name, None)
     return _at(run, (id(network), name), table, point, reject, span, known, going=going)
 
@@ -92,7 +91,7 @@ def among(
 ) -> ModelValue:
     """The same among some elements only, as in `road.laneAt(point)`."""
     key = (name, tuple(element.id for element in elements))
-    table = run.lookups.table(key, name, f"{name} {key}", lambda: [own(elements)])
+    table = run.lookups.table(key, lambda: LookupTable.of_layers(name, f"{name} {key}", [own(elements)]))
     return _at(run, key, table, point, reject, span, None)
 
 
@@ -101,7 +100,7 @@ def look_up_ways(run: Interpreter, intersection: Intersection, point: ModelValue
     key, name = ("maneuversAt", intersection.id), f"maneuversAt of {intersection.id}"
     if not intersection.maneuvers:
         return ()
-    table = run.lookups.table(key, name, name, lambda: ways_everywhere(intersection))
+    table = run.lookups.table(key, lambda: LookupTable.of_layers(name, name, ways_everywhere(intersection)))
     return _at(run, key, table, point, None, span, lambda x, y: ways_at(intersection, x, y), ())
 
 
@@ -119,8 +118,8 @@ def _at(
     run.budget.step(span, run.budget.LOOK_UP_STEPS)
     place = to_vector(point, span)
     certain = as_constant(run, place)
-    options = (*table.options, nothing)
     if isinstance(certain, Constant):
+        options = (*table.options, nothing)
         x, y = cast(Vector, certain.value)
         heading = as_constant(run, going[0]) if going else None
         if isinstance(heading, Constant) and isinstance(heading.value, float):
@@ -137,8 +136,9 @@ def _at(
             raise fail("map-lacks", f"the map has nothing for `{table.occupancy.name}`", span, "there is none",
                        ("the map of another dataset may have it",))  # fmt: skip
         return None
-    run.budget.step(span, len(options) // run.budget.ITEMS_PER_STEP)
     index = run.lookups.index(key, table, place, going, span)
+    options = (*run.lookups.options(table, index), nothing)
+    run.budget.step(span, len(options) // run.budget.ITEMS_PER_STEP)
     if reject:
         run.excluded.add(index, [len(table.options)], len(options), span)
     return Choice(index, options, len(options))

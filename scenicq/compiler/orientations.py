@@ -22,6 +22,7 @@ from scenicq.forest.nodes import (
     Select,
     Undefined,
 )
+from scenicq.geometry.abstract_map import AbstractDirection
 from scenicq.geometry.regions import (
     DifferenceOf,
     IntersectionOf,
@@ -144,6 +145,12 @@ def _field(heading: Node) -> int | None:
     return id(heading.field.value if isinstance(heading.field, Constant) else heading.field)
 
 
+def _is_abstract(heading: Node) -> bool:
+    """Whether a heading is that of any of several elements."""
+    field = heading.field if isinstance(heading, DirectionAt) else None
+    return isinstance(field, Constant) and isinstance(field.value, AbstractDirection)
+
+
 def _any_heading(span: Span | None) -> Node:
     return Range(build.constant(-math.pi, span), build.constant(math.pi, span), span=span)
 
@@ -167,7 +174,7 @@ def _chosen_orientation(region: Select, point: Node, span: Span | None) -> Node 
     fields = {_field(each) for each in known}
     if None in fields:
         return Select(region.index, tuple(heading or known[0] for heading in found), span=span)
-    if len(fields) == 1:
+    if len(fields) == 1 and not _is_abstract(known[0]):
         return known[0]
     options = tuple(cast(DirectionAt, heading or known[0]).field for heading in found)
     return DirectionAt(Select(region.index, options, span=span), point, span=span)

@@ -8,21 +8,22 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, cast
 
 from scenicq.compiler import operators
-from scenicq.compiler.coerce import OBSERVABLE, property_node, to_boolean
+from scenicq.compiler.coerce import OBSERVABLE, observed_property, property_node, to_boolean
 from scenicq.compiler.road_courses import along
 from scenicq.compiler.values import Instance, LabelObjects, ModelValue, Nearest, OtherList, ScenicClass, describe, fail
 from scenicq.errors import Span
 from scenicq.forest import build
+from scenicq.forest.course_ends import has_ends
 from scenicq.forest.kinds import kind_of
 from scenicq.forest.nodes import (
     ELEMENT,
     GIVEN,
     IDENTITY,
+    OPEN,
     RANK,
     TRACK,
     Among,
@@ -31,14 +32,15 @@ from scenicq.forest.nodes import (
     Compare,
     CompareOp,
     Constant,
-    CourseCoordinate,
     DirectionAt,
     Feature,
     Index,
+    Kind,
     LogicOp,
     Node,
     Select,
 )
+from scenicq.forest.unobserved import certain_and_possible
 from scenicq.forest.walk import children, is_leaf, leaves, postorder, rebuild
 
 if TYPE_CHECKING:
@@ -51,6 +53,7 @@ __all__ = [
     "is_nearest",
     "list_elements",
     "nearest",
+    "of_nearest",
     "others",
     "same_object",
     "truth_of_list",
@@ -88,14 +91,19 @@ def nearest(run: Interpreter, span: Span, *args: ModelValue, **named: ModelValue
     cls = _class(run, span, "nearest", args, named, _FILTERS)
     every, counts, ego = __all_of(run, cls, span), _counting(run, named, span), run.ego(span)
     made = Nearest(cls, None, span, objects=every, counts=counts, ego=ego)
-    element = _element(every, span)
-    away = operators.distance_to(element, ego, span)
-    for name in OBSERVABLE:
-        value = cast(Node, property_node(element, name, span))
-        made.properties[name] = _among(
-            AmongOp.NEAREST, every, element, counts(element), span, distance=away, value=value
-        )
+    made.properties.update({name: of_nearest(made, name, kind, span) for name, kind in OBSERVABLE.items()})
     return made
+
+
+def of_nearest(near: Nearest, name: str, kind: Kind, span: Span) -> Node:
+    """A property of the nearest that labels tell."""
+    assert near.objects is not None
+    assert near.counts is not None
+    element = _element(near.objects, span)
+    away = operators.distance_to(element, near.ego, span)
+    value = observed_property(element, name, kind, span)
+    counts = near.counts(element)
+    return _among(AmongOp.NEAREST, near.objects, element, counts, span, distance=away, value=value)
 
 
 def is_nearest(one: Instance, other: Nearest, span: Span) -> Node:
@@ -220,19 +228,20 @@ def _counting(run: Interpreter, named: Mapping[str, ModelValue], span: Span) -> 
         if "within" in named:
             asked.append(operators.within(place, named["within"], span))
         if ahead:
-            asked.append(_is_ahead(along(run, span, run.ego(span), place), span))
+            far = along(run, span, run.ego(span), place)
+            asked.append(Compare(CompareOp.GT, far, build.constant(0.0), span=span))
         return _all_of(tuple(asked), span=span) if asked else build.constant(True)
 
     return counts
 
 
-def _is_ahead(far: CourseCoordinate, span: Span) -> Node:
-    """Whether what is known up to two ends is above 0."""
-    least, most, itself = (
-        Compare(CompareOp.GT, each, build.constant(0.0), span=span)
-        for each in (replace(far, end=0), replace(far, end=1), far)
-    )
-    return build.logic(LogicOp.OR, least, build.logic(LogicOp.AND, most, itself, span=span), span=span)
+def _by_ends(condition: Node, element: Instance) -> Node:
+    """A condition of which numbers that are known up to two ends tell as much as they do."""
+    if not any(map(has_ends, postorder((condition,)))):
+        return condition
+    certain, possible = certain_and_possible(condition, lambda _: False)
+    unknown = Feature(cast(int, element.index), OPEN, "boolean", True, span=condition.span)
+    return build.connect(LogicOp.OR, [certain, build.connect(LogicOp.AND, [possible, unknown])])
 
 
 _all_of = partial(build.connect, LogicOp.AND)
@@ -253,7 +262,7 @@ def _among(
         ScenarioError: unsupported-construct, where what is asked of each hangs on chance, or on a direction.
     """
     given: dict[int, Node] = {}
-    excluded = objects.excluded
+    excluded, condition = objects.excluded, _by_ends(condition, element)
     asked = [each for each in (condition, distance, value) if each is not None]
     closed = iter([_closed(each, cast(int, element.index), given, span) for each in asked])
     body = Body(next(closed), *(None if each is None else next(closed) for each in (distance, value)))

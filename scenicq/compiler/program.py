@@ -22,6 +22,7 @@ from scenicq.compiler.environment import Environment
 from scenicq.compiler.imported_files import Loader
 from scenicq.compiler.imports import Modules
 from scenicq.compiler.interpreter import Interpreter
+from scenicq.compiler.label_attributes import LabelAttributes
 from scenicq.compiler.models import default_library, is_anywhere
 from scenicq.compiler.modular import run_program, top_scenario
 from scenicq.compiler.recorded_values import recorded_values
@@ -63,6 +64,7 @@ def compile_scenario(
     lanes: LaneRule = "along",
     scenario: str | None = None,
     params: Mapping[str, float | str] | None = None,
+    label_attributes: LabelAttributes | None = None,
 ) -> Scenario:
     """Compile a program against a map.
 
@@ -82,6 +84,8 @@ def compile_scenario(
         lanes: Which of several lanes that contain an object are its own: those that lead its way, or all.
         scenario: Which scenario of the program runs; `Main`, the only one, or the program itself if not given.
         params: Values of global parameters, whatever the program says.
+        label_attributes: Gives the types of the values of each attribute that labels of the dataset have; asked where
+            the program reads what it does not give its objects itself.
 
     Raises:
         ScenarioError: The program is wrong or uses what is not supported.
@@ -92,7 +96,7 @@ def compile_scenario(
             return _compiled(
                 source, network, version, initial=initial, timed=timed, loader=loader, model=model,
                 map_defaults=map_defaults, gap_s=gap_s, lanes=lanes, wanted=scenario,
-                params=params or {},
+                params=params or {}, label_attributes=label_attributes,
             )  # fmt: skip
     except Exhausted:
         what = f"evaluating the program takes more than {LIMITS.program_seconds:g} s"
@@ -114,12 +118,13 @@ def _compiled(
     lanes: LaneRule,
     wanted: str | None,
     params: Mapping[str, float | str],
+    label_attributes: LabelAttributes | None,
 ) -> Scenario:
     module = parse(source, version)
     chosen = decide_version(module)
     world = Modules(network, chosen, initial, loader, map_defaults=map_defaults and bool(network.kinds))
     run = world.interpreter
-    run.timed, run.gap_s, run.lanes = timed, gap_s, lanes
+    run.timed, run.gap_s, run.lanes, run.label_attributes = timed, gap_s, lanes, label_attributes
     run.params.update({name: (value, _start(source), False) for name, value in params.items()})
     run.given_params = frozenset(params)
     try:

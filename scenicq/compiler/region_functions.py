@@ -9,10 +9,10 @@ import shapely
 
 from scenicq.compiler.coerce import to_field, to_heading, to_region, to_scalar, to_vector
 from scenicq.compiler.values import ModelValue, describe, fail
-from scenicq.errors import Span
+from scenicq.errors import CannotEvaluate, Span
 from scenicq.forest import build
 from scenicq.forest.bounds import scalar_bounds
-from scenicq.forest.compute import CannotEvaluate, fold
+from scenicq.forest.compute import fold
 from scenicq.forest.evaluate import evaluate
 from scenicq.forest.nodes import ArithmeticOp, Constant, DirectionAt, DiscAt, Node, RectangleAt, Undefined
 from scenicq.geometry.fields import VectorField

@@ -189,6 +189,8 @@ def unknown_attribute(value: ModelValue, name: str, known: set[str], place: str,
         hints = (BIKE_LANES,)
     if is_thing and (said := _BY_ATTRIBUTE.get(name.replace("_", "").lower())):
         hints = (said,)
+    if is_thing and not hints:
+        hints = (f"`{name}` can be read where labels of a dataset have it, which `scenicq check` is given, too",)
     if owner := _OWNER.search(span.source.text, 0, span.start):
         label = f"`{owner[1]}` is {shown}"
     return fail("unknown-attribute", message, span, label, hints)

@@ -23,7 +23,8 @@ from typing import NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from scenicq.evaluate.expression_arrays import UncomputedError, evaluate_arrays
+from scenicq.errors import CannotEvaluate
+from scenicq.evaluate.expression_arrays import evaluate_arrays
 from scenicq.evaluate.observed_columns import ANGLES, Observed, ObservedColumns
 from scenicq.evaluate.variables import Draws, density_of, point_density
 from scenicq.forest.columns import Array, Data, Vectors, constant_column
@@ -126,7 +127,7 @@ class GroupDensity:
         """Work out the densities of some labels, at least one.
 
         Raises:
-            UncomputedError: There is no density, or it cannot be computed.
+            CannotEvaluate: There is no density, or it cannot be computed.
         """
         outcomes = self._outcomes()
         if outcomes is not None:
@@ -138,7 +139,7 @@ class GroupDensity:
         """Split the group by the choices that decide which variables there are: each outcome with its probability.
 
         Raises:
-            UncomputedError: There are too many, or under one of them a feature has no density.
+            CannotEvaluate: There are too many, or under one of them a feature has no density.
         """
         expressions = [each.expression for each in self.group.constraints]
         choices: dict[Identity, Index] = {}
@@ -150,7 +151,7 @@ class GroupDensity:
         if not choices:
             return None
         if math.prod(len(each.weights) for each in choices.values()) > _OUTCOMES:
-            raise UncomputedError(f"choices with more than {_OUTCOMES} outcomes have variables of their own")
+            raise CannotEvaluate(f"choices with more than {_OUTCOMES} outcomes have variables of their own")
         found: list[tuple[float, GroupDensity]] = []
         for chosen in itertools.product(*(range(len(each.weights)) for each in choices.values())):
             weight = math.prod(
@@ -170,7 +171,7 @@ class GroupDensity:
         found = GroupDensity(replace(self.group, constraints=tuple(put.values())), self.draws)
         for each in self._continuous:
             if not any(map(_is_continuous, leaves(put[id(each)].expression))):
-                raise UncomputedError(f"`{each.property}` has a single value under an outcome of a choice")
+                raise CannotEvaluate(f"`{each.property}` has a single value under an outcome of a choice")
         found._finite = tuple(cast(Comparison, put[id(each)]) for each in self._finite)
         conditions = [put[id(each)] for each in self._conditions]
         found._conditions = tuple(cast(Condition, each) for each in conditions)
@@ -234,7 +235,7 @@ class GroupDensity:
             values, size = _solve(matrix, rows)
             if np.any(size == 0):
                 names = ", ".join(f"`{each.property}`" for each in self._continuous)
-                raise UncomputedError(f"{names} of a group are not spread over an area under some hidden values")
+                raise CannotEvaluate(f"{names} of a group are not spread over an area under some hidden values")
             solved = self._assign(values)
             with np.errstate(all="ignore"):
                 density = np.where(size > 0, 1 / size, 0.0)
@@ -292,7 +293,7 @@ class GroupDensity:
         every = [self._roots.get(id(each), each.expression) for each in self.group.constraints]
         parents = [node for node in postorder(every) if any(child is index for child in children(node))]
         if parents != [choice] or [n for n in postorder(every) if choice in children(n)] != [leaf]:
-            raise UncomputedError("a region that other features hang on, too")
+            raise CannotEvaluate("a region that other features hang on, too")
         total = sum(index.weights)
         return tuple((weight / total, option) for weight, option in zip(index.weights, choice.options, strict=True))
 
@@ -329,11 +330,11 @@ class GroupDensity:
                     try:
                         if self._is_affine(columns.first(8), chosen, wanted):
                             return chosen
-                    except UncomputedError as error:
+                    except CannotEvaluate as error:
                         self.reason = str(error)
         names = ", ".join(f"`{each.property}`" for each in self._continuous)
         more = f" ({self.reason})" if self.reason else ""
-        raise UncomputedError(f"{names} of a group cannot be solved for its variables{more}")
+        raise CannotEvaluate(f"{names} of a group cannot be solved for its variables{more}")
 
     def _roots_of_continuous(self) -> tuple[Node, ...]:
         return tuple(self._roots[id(each)] for each in self._continuous)
@@ -424,7 +425,7 @@ def _coordinates(values: Sequence[Data]) -> list[Array]:
         elif isinstance(value, np.ndarray):
             found.append(value)
         else:
-            raise UncomputedError("a feature that is no number")
+            raise CannotEvaluate("a feature that is no number")
     return found
 
 

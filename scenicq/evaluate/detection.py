@@ -19,6 +19,7 @@ from scenicq.evaluate.frame_of_reference import check_distance, check_fit
 from scenicq.evaluate.precision import ERRORS, Errors, box_errors
 from scenicq.evaluate.region_of_interest import RegionOfInterest
 from scenicq.importers.predictions import THRESHOLDS_M, Predictions, Protocol
+from scenicq.number_ranges import expand_ranges
 from scenicq.option_values import Distances
 from scenicq.store.classes import is_class
 from scenicq.store.dataset import Dataset
@@ -346,7 +347,7 @@ def _first_of_each(frame: Numbers, category: Numbers, protocol: Protocol) -> NDA
     order = np.argsort(key, kind="stable")
     starts = np.flatnonzero(np.append(True, key[order][1:] != key[order][:-1]))
     sizes = np.diff(np.append(starts, len(order)))
-    place = np.arange(len(order)) - np.repeat(starts, sizes)
+    place = expand_ranges(0, sizes)
     return np.sort(order[place < protocol.most])
 
 

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
-from typing import Any, TypeAlias, cast, get_args
+from typing import Any, TypeAlias, Unpack, cast
 
 import msgspec
 import numpy as np
@@ -21,9 +21,10 @@ from scenicq.evaluate.balance import Balance, balance
 from scenicq.evaluate.benchmark import BenchmarkFigures, benchmark_figures
 from scenicq.evaluate.classes import ClassFigures, class_figures
 from scenicq.evaluate.clusters import find_clusters, parameters_of
-from scenicq.evaluate.comparison import MARGIN, ObjectComparison, ShareComparison, compare
+from scenicq.evaluate.comparison import ObjectComparison, ShareComparison, compare
 from scenicq.evaluate.controls import Likeness, number_of
-from scenicq.evaluate.detection import DISTANCES, Detection, FoundWithin, Missing, detect
+from scenicq.evaluate.detection import Detection, FoundWithin, detect
+from scenicq.evaluate.evaluation_options import EvaluationOptions, EvaluationTexts, read_evaluation_options
 from scenicq.evaluate.matched import Matched, read_matched
 from scenicq.evaluate.paired_models import PairedComparison, compare_pair
 from scenicq.evaluate.paired_runs import pair_runs
@@ -34,7 +35,6 @@ from scenicq.evaluate.weighting import Weighted, weigh
 from scenicq.importers.prediction_checks import find_doubts
 from scenicq.importers.prediction_files import read_predictions
 from scenicq.importers.predictions import Predictions
-from scenicq.option_values import MARGIN_OPTION, SCORE, SEED, OneOf, read_option
 from scenicq.query.execution.records import FrameRecord, IntervalRecord, Record, SummaryRecord, record, record_of
 from scenicq.query.execution.result_files import RecordStream, read_records
 from scenicq.query.execution.result_origin import check_origins, name_origin
@@ -181,14 +181,7 @@ def evaluate(
     results: Results | Mapping[str, Results],
     dataset: Dataset,
     predictions: Predictions | Path | str,
-    *,
-    distance_m: float | str | Mapping[str, float] = 2.0,
-    least_score: float | None = None,
-    missing: Missing = "error",
-    simulated: Path | str | None = None,
-    cluster: str | None = None,
-    margin: float = MARGIN,
-    seed: int = 0,
+    **options: Unpack[EvaluationTexts],
 ) -> Evaluation:
     """Judge a model's detections on the frames that match, against the other frames.
 
@@ -196,61 +189,40 @@ def evaluate(
         results: Those of one scenario, or of several by their names.
         dataset: The dataset that the results are of.
         predictions: What the model has detected, or a file of it.
-        distance_m: Centre distance within which an object counts as found: 0.5, 1, 2 or 4; for some classes another
-            one, such as "2,pedestrian=0.5" or {"": 2, "pedestrian": 0.5}.
-        least_score: Score from which a prediction counts, but for average precision; all by default.
-        missing: What a frame without predictions is: an error, a frame in which nothing was found, or left out.
-        simulated: A CSV file of simulated runs; see `read_simulated`.
-        cluster: The parameter whose values recordings of one cluster share, such as `drive`, or `recording`; by default
-            the first of `CLUSTER_KEYS` that the dataset has.
-        margin: What is missed more often by less than this share counts as no worse.
-        seed: Seed of the resamples: the same figures come from the same seed.
+        options: As `EvaluationTexts` has them: `distance_m` (also "2,pedestrian=0.5" or {"": 2, "pedestrian": 0.5}),
+            `least_score`, `missing` ("error", "empty" or "skip"), `simulated` (see `read_simulated`), `cluster` (by
+            default the first of `CLUSTER_KEYS` that the dataset has), `margin` and `seed`, as of `scenicq evaluate`.
+            The same figures come from the same seed.
 
     Raises:
         DataError: A file cannot be read or does not fit the others; option-invalid for another distance, or a score
             that is no number.
     """
-    found = evaluate_models(
-        results, dataset, {"the model": predictions}, distance_m=distance_m, least_score=least_score, missing=missing,
-        simulated=simulated, cluster=cluster, margin=margin, seed=seed,
-    )  # fmt: skip
-    return next(iter(found.models.values()))
+    return next(iter(evaluate_models(results, dataset, {"the model": predictions}, **options).models.values()))
 
 
 def evaluate_models(
     results: Results | Mapping[str, Results],
     dataset: Dataset,
     predictions: Mapping[str, Predictions | Path | str],
-    *,
-    distance_m: float | str | Mapping[str, float] = 2.0,
-    least_score: float | None = None,
-    missing: Missing = "error",
-    simulated: Path | str | None = None,
-    cluster: str | None = None,
-    margin: float = MARGIN,
-    seed: int = 0,
+    **options: Unpack[EvaluationTexts],
 ) -> ModelsEvaluation:
     """Judge several models on the same frames, each by itself and each beside those before it.
 
     Args and errors are those of `evaluate`, but for `predictions`, which are by the names of the models, and
     `simulated`, which is of one model. All tests are corrected together.
     """
-    within = FoundWithin.of(read_option("distance_m", DISTANCES, distance_m))
-    seed, missing = read_option("seed", SEED, seed), read_option("missing", OneOf(get_args(Missing)), missing)
-    least_score = None if least_score is None else read_option("least_score", SCORE, least_score)
-    margin = read_option("margin", MARGIN_OPTION, margin)
+    asked = read_evaluation_options(**options)
+    simulated = asked.simulated
     if simulated is not None and len(predictions) > 1:
         message = "simulated runs are those of one model, and there are several"
         raise DataError(Diagnostic("option-invalid", message, hints=("evaluate that model by itself",)))
-    runs = None if simulated is None else read_simulated(Path(simulated))
+    runs = None if simulated is None else read_simulated(simulated)
     named: Mapping[str, Results] = (
         cast("Mapping[str, Results]", results) if isinstance(results, Mapping) else {_name_of(results): results}
     )
     doubts: list[Diagnostic] = []
-    judges = {
-        name: _Judge(_detect(each, dataset, missing, within, doubts), within, least_score, seed, margin, cluster)
-        for name, each in predictions.items()
-    }
+    judges = {name: _Judge(_detect(each, dataset, asked, doubts), asked) for name, each in predictions.items()}
     any_judge = next(iter(judges.values()))
     matched: list[Matched] = []
     for name, each in named.items():
@@ -280,8 +252,8 @@ def evaluate_models(
             told = [replace(each, message=f"{name}: {each.message}") for each in told]
         warnings += told
         models[name] = Evaluation(
-            name_origin(dataset), judge.detection.predictions.name, within, judge.least, own, (*doubts, *told),
-            judge.detection, benchmark_figures(judge.detection),
+            name_origin(dataset), judge.detection.predictions.name, asked.distance_m, judge.least, own,
+            (*doubts, *told), judge.detection, benchmark_figures(judge.detection),
         )  # fmt: skip
     return ModelsEvaluation(models, tuple(pairs), tuple(warnings))
 
@@ -302,8 +274,7 @@ def name_models(paths: Sequence[Path]) -> tuple[str, ...]:
 
 
 def _detect(
-    predictions: Predictions | Path | str, dataset: Dataset, missing: Missing, within: FoundWithin,
-    doubts: list[Diagnostic],
+    predictions: Predictions | Path | str, dataset: Dataset, asked: EvaluationOptions, doubts: list[Diagnostic]
 ) -> Detection:  # fmt: skip
     """What a model has detected; a file's predictions are not kept beside it."""
     detected = predictions if isinstance(predictions, Predictions) else read_predictions(Path(predictions))
@@ -311,8 +282,8 @@ def _detect(
         Diagnostic("predictions-doubtful", f"{detected.name}: {each}", severity="warning")
         for each in find_doubts(detected)
     ]
-    detection = detect(dataset, detected, missing)
-    if strange := [name for name in within.of_class if name not in detection.classes]:
+    detection = detect(dataset, detected, asked.missing)
+    if strange := [name for name in asked.distance_m.of_class if name not in detection.classes]:
         hint = f"there are {', '.join(detection.classes)}"
         raise DataError(
             Diagnostic("option-invalid", f"a distance of `{strange[0]}`, which is no class here", hints=(hint,))
@@ -442,18 +413,16 @@ def _warnings(found: Iterable[ScenarioEvaluation], detection: Detection) -> Iter
 class _Judge:
     """Labels and predictions, ready to be divided by scenarios."""
 
-    def __init__(
-        self, detection: Detection, within: FoundWithin, least: float | None, seed: int, margin: float,
-        cluster: str | None,
-    ) -> None:  # fmt: skip
-        self.detection, self._within, self._margin = detection, within, margin
+    def __init__(self, detection: Detection, asked: EvaluationOptions) -> None:
+        self.detection, self._asked = detection, asked
+        least = asked.least_score
         self.least = float(detection.predictions.score.min(initial=0.0)) if least is None else least
         # each model's figures are those that it has by itself
-        self._rng = np.random.default_rng(seed)
-        self._clusters = clusters = find_clusters(detection.frames, cluster)
+        self._rng = np.random.default_rng(asked.seed)
+        self._clusters = clusters = find_clusters(detection.frames, asked.cluster)
         objects = detection.objects
         self.counted = detection.object_class >= 0
-        score = detection.found_score(within)
+        score = detection.found_score(asked.distance_m)
         self.missed = self.counted & ((score < self.least) | np.isneginf(score))
         self._weights = resamples(clusters.count, self._rng)
         self._parameters = parameters_of(detection.frames, clusters)
@@ -526,7 +495,7 @@ class _Judge:
         for about, mine in groups:
             both = mine & self.counted & before.counted
             yield compare_pair(
-                about, self.missed, before.missed, both, self._like.cluster, self._rng, margin=self._margin,
+                about, self.missed, before.missed, both, self._like.cluster, self._rng, margin=self._asked.margin,
                 unit=self._clusters.unit,
             )  # fmt: skip
 
@@ -608,7 +577,7 @@ class _Judge:
         used = np.flatnonzero(mine | others)
         found = compare(
             about, self.missed[used], mine[used], others[used], like.taken(used), self._rng,
-            margin=self._margin, unit=self._clusters.unit,
+            margin=self._asked.margin, unit=self._clusters.unit,
         )  # fmt: skip
         if found.groups is None:
             return found
@@ -620,7 +589,7 @@ class _Judge:
         count = len(matching)
         lost = np.bincount(detection.objects.frame[mine & self.missed], minlength=count)
         of = np.bincount(detection.objects.frame[mine], minlength=count)
-        wrong = detection.is_false(self._within) & (detection.predictions.score >= self.least)
+        wrong = detection.is_false(self._asked.distance_m) & (detection.predictions.score >= self.least)
         false = np.bincount(detection.frame[wrong], minlength=count)
         numbers = np.flatnonzero(matching)
         with np.errstate(invalid="ignore", divide="ignore"):

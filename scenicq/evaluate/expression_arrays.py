@@ -12,20 +12,16 @@ from itertools import count
 import numpy as np
 from numpy.typing import NDArray
 
+from scenicq.errors import CannotEvaluate
 from scenicq.forest.column_domain import ColumnDomain
 from scenicq.forest.columns import DEFINED, UNDEFINED, UNKNOWN, Column, Data, Vectors
-from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.interpret import interpret, steps_of
 from scenicq.forest.nodes import DirectionAt, Feature, Identity, Leaf, Node
 
-__all__ = ["UncomputedError", "evaluate_arrays", "points_of"]
+__all__ = ["evaluate_arrays", "points_of"]
 
 _MOST_POINTS = 300_000
 """Points at which a map is asked at most."""
-
-
-class UncomputedError(Exception):
-    """Something cannot be computed for many draws at once; the message says what."""
 
 
 def evaluate_arrays(
@@ -45,14 +41,14 @@ def evaluate_arrays(
         draws: How many there are.
 
     Raises:
-        UncomputedError: An expression has a part that cannot be computed so.
+        CannotEvaluate: An expression has a part that cannot be computed so.
     """
     drawn: dict[Identity, Column] = {}
     fields = count()
 
     def seen(node: Feature) -> Column:
         if (node.object, node.property) not in observed:
-            raise UncomputedError(f"`{node.property}` of an object has no value")
+            raise CannotEvaluate(f"`{node.property}` of an object has no value")
         return _column(observed[node.object, node.property])
 
     def value(leaf: Leaf, args: Sequence[Column]) -> Column:
@@ -64,10 +60,7 @@ def evaluate_arrays(
         return np.random.default_rng(next(fields)).permutation(draws) % np.maximum(counts, 1)
 
     with np.errstate(all="ignore"):
-        try:
-            known = interpret(steps_of(*roots), ColumnDomain(seen, value, pick, _MOST_POINTS))
-        except CannotEvaluate as error:
-            raise UncomputedError(str(error)) from None
+        known = interpret(steps_of(*roots), ColumnDomain(seen, value, pick, _MOST_POINTS))
         return [_values(known[id(root)]) for root in roots]
 
 
@@ -84,7 +77,7 @@ def _column(data: Data) -> Column:
 def _values(column: Column) -> Data:
     data, status = column
     if np.equal(status, UNKNOWN).any():
-        raise UncomputedError("what geometry cannot decide")
+        raise CannotEvaluate("what geometry cannot decide")
     missing = np.not_equal(status, DEFINED)
     if not missing.any():
         return data
@@ -92,7 +85,7 @@ def _values(column: Column) -> Data:
         return np.where(missing, np.nan, data[0]), np.where(missing, np.nan, data[1])
     if isinstance(data, np.ndarray):
         return data & ~missing if data.dtype == np.bool_ else np.where(missing, np.nan, data)
-    raise UncomputedError("a region without a value for some labels")
+    raise CannotEvaluate("a region without a value for some labels")
 
 
 def points_of(point: Vectors) -> tuple[NDArray[np.float64], tuple[int, ...]]:

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from scenicq.evaluate.expression_arrays import UncomputedError
+from scenicq.errors import CannotEvaluate
 from scenicq.forest.columns import Array, Coded, Data
 from scenicq.forest.groups import Comparison
 from scenicq.forest.nodes import Value
@@ -50,7 +50,7 @@ class ObservedColumns:
             elif isinstance(value, np.ndarray):
                 yield value, each.property in ANGLES
             else:
-                raise UncomputedError(f"`{each.property}` is no number")
+                raise CannotEvaluate(f"`{each.property}` is no number")
 
     def holds(self, each: Comparison, value: Data) -> Array:
         """Where a feature that hangs on finite choices has the label's value."""
@@ -64,7 +64,7 @@ class ObservedColumns:
             if each.property in ANGLES:
                 off = np.abs(np.mod(own - value + math.pi, math.tau) - math.pi)
             return off <= _SLACK
-        raise UncomputedError(f"`{each.property}` is no number")
+        raise CannotEvaluate(f"`{each.property}` is no number")
 
 
 def _column(values: list[Value]) -> Data:

@@ -5,28 +5,32 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from scenicq.errors import Diagnostic
 from scenicq.evaluate.comparison import Share
 from scenicq.evaluate.detection import Detection
 from scenicq.evaluate.evaluation import Evaluation, ModelsEvaluation, ScenarioEvaluation, WorstFrame
-from scenicq.evaluate.rows import Table, balance_table, frame_counts, models_table, overview, tables
+from scenicq.evaluate.rows import Table, balance_table, frame_counts, models_table, overview, tables, worst_table
 from scenicq.geometry.boxes import corners
 from scenicq.geometry.camera import box_corners, box_edges
 from scenicq.report.backdrop import Backdrop
 from scenicq.report.camera_pictures import SpaceBox, camera_image, space_box
-from scenicq.report.frames import table, when
+from scenicq.report.frames import when
 from scenicq.report.page import page
 from scenicq.report.picture import View, ground, plane_of
 from scenicq.report.scene import draw_object
 from scenicq.report.sensors import Sensor, SensorFiles, can_make_thumbnails, roots_of
 from scenicq.report.svg import Plane, element, escape, points_path
+from scenicq.report.templates import markup
 from scenicq.report.write import new_report
 from scenicq.store.dataset import Dataset
 from scenicq.store.labels import Label
 from scenicq.store.remote_path import AnyPath
+
+if TYPE_CHECKING:
+    from markupsafe import Markup
 
 __all__ = ["SHOWN", "write_pages"]
 
@@ -75,20 +79,23 @@ def write_pages(
 
 def _cell(text: str) -> str:
     """A cell of a table: a figure breaks before its interval at most."""
-    return escape(text).replace(" %", "\u00a0%").replace(", ", ",\u00a0").replace("&lt; ", "&lt;\u00a0")
+    return text.replace(" %", "\u00a0%").replace(", ", ",\u00a0").replace("< ", "<\u00a0")
 
 
-def _table(shown: Table, graphs: Sequence[str] = ()) -> str:
+def _table(shown: Table, graphs: Sequence[str] = (), links: Sequence[str] = ()) -> Markup:
     """A table of texts.
 
     Args:
         shown: The table.
         graphs: A last cell of each row; none of them where there are none.
+        links: The anchor that the first cell of each row leads to, where there are any.
     """
     title, head, rows = shown
-    cells = [[*map(_cell, row), *graphs[number : number + 1]] for number, row in enumerate(rows)]
     names = [name.lower() for name in head] + ["0 to 100 %"] * bool(graphs)
-    return table(title[:1].upper() + title[1:], names, cells)
+    return markup(
+        "evaluation", "shown", title=title[:1].upper() + title[1:], head=names,
+        rows=[[*map(_cell, row)] for row in rows], graphs=graphs, links=links,
+    )  # fmt: skip
 
 
 def _whiskers(share: Share, other: Share | None) -> str:
@@ -117,48 +124,41 @@ def _counted(count: int, what: str, several: str) -> str:
 _TITLE = "Detections on the frames that match"
 
 
-def _text(evaluation: Evaluation | ModelsEvaluation, dataset: Dataset, files: SensorFiles) -> str:
+def _text(evaluation: Evaluation | ModelsEvaluation, dataset: Dataset, files: SensorFiles) -> Markup:
     """The whole page."""
+    sentences: list[str] = []
+    pairs = None
     if isinstance(evaluation, Evaluation):
-        one = _Model(evaluation, dataset, files)
-        head = element("header", element("h1", _TITLE), *one.origin, _list(evaluation.warnings))
-        return page(_TITLE, [head, element("main", *one.sections())], script=False)
-    links = [
-        element("li", element("a", escape(name), href=f"#{_anchor_of(number)}"))
-        for number, name in enumerate(evaluation.models)
-    ]
-    head = element("header", element("h1", _TITLE), element("ul", *links), _list(evaluation.warnings))
-    graphs = [_whiskers(each.share, each.other) for each in evaluation.pairs]
-    parts = [element("p", element("b", escape(each.sentence))) for each in evaluation.pairs]
-    parts.append(_table(models_table(evaluation), graphs))
-    for number, (name, each) in enumerate(evaluation.models.items()):
-        model = _Model(each, dataset, files, _anchor_of(number))
-        parts.append(element("section", element("h1", escape(name)), *model.origin, id=_anchor_of(number)))
-        parts += model.sections()
-    return page(_TITLE, [head, element("main", *parts)], script=False)
-
-
-def _anchor_of(model: int) -> str:
-    return f"model-{model}"
-
-
-def _list(warnings: Sequence[Diagnostic]) -> str:
-    return (
-        element("ul", *(element("li", escape(each.message)) for each in warnings), class_="cause") if warnings else ""
-    )
+        models = [_Model("", evaluation, dataset, files)]
+    else:
+        graphs = [_whiskers(each.share, each.other) for each in evaluation.pairs]
+        sentences, pairs = [each.sentence for each in evaluation.pairs], _table(models_table(evaluation), graphs)
+        models = [
+            _Model(name, each, dataset, files, f"model-{number}")
+            for number, (name, each) in enumerate(evaluation.models.items())
+        ]
+    body = markup(
+        "evaluation", "body", title=_TITLE, models=models, warnings=evaluation.warnings, sentences=sentences,
+        pairs=pairs,
+    )  # fmt: skip
+    return page(_TITLE, [body], script=False)
 
 
 class _Model:
     """What a page shows of one model.
 
     Args:
+        name: Its name; "" where it is the only one.
         evaluation: Its figures.
         dataset: The labels.
         files: Sensor files and their thumbnails.
         anchor: What the anchors of its parts begin with.
     """
 
-    def __init__(self, evaluation: Evaluation, dataset: Dataset, files: SensorFiles, anchor: str = "") -> None:
+    def __init__(
+        self, name: str, evaluation: Evaluation, dataset: Dataset, files: SensorFiles, anchor: str = ""
+    ) -> None:
+        self.name, self.anchor = name, anchor
         self._evaluation, self._dataset, self._files = evaluation, dataset, files
         self._prefix = f"{anchor}-" if anchor else ""
         self._backdrops: dict[str, Backdrop] = {}
@@ -166,61 +166,43 @@ class _Model:
         self._labels = {label.frame: label for label in dataset.labels(shown)}
 
     @property
-    def origin(self) -> tuple[str, ...]:
-        """What was judged on what."""
+    def origin(self) -> dict[str, str]:
+        """What was judged on what, and what its benchmark says."""
         found = self._evaluation
         score = f", score {found.least_score:g} or more" if found.least_score else ""
         told = f"{found.predictions} on {found.dataset}: found within {found.within}{score}"
-        if found.benchmark is None:
-            return (element("p", escape(told)),)
-        return element("p", escape(told)), element("p", escape(found.benchmark.sentence), class_="hint")
+        return {"told": told, "benchmark": "" if found.benchmark is None else found.benchmark.sentence}
 
-    def sections(self) -> list[str]:
+    def sections(self) -> list[Markup]:
         """All scenarios, after a table of them where they are several."""
         found = self._evaluation.scenarios
         summary = [self._overview()] if len(found) > 1 else []
         return [*summary, *(part for each in found for part in self._scenario(each))]
 
-    def _overview(self) -> str:
+    def _overview(self) -> Markup:
         """All scenarios in one table, with links to each."""
-        title, head, rows = overview(self._evaluation)
+        shown = overview(self._evaluation)
         place = {each.name: number for number, each in enumerate(self._evaluation.scenarios)}
-        cells = [
-            [element("a", escape(row[0]), href=f"#{self._section(place[row[0]])}"), *map(_cell, row[1:])]
-            for row in rows
-        ]
-        return table(title.capitalize(), [name.lower() for name in head], cells)
+        return _table(shown, links=[self._section(place[row[0]]) for row in shown[2]])
 
-    def _scenario(self, each: ScenarioEvaluation) -> Iterator[str]:
-        counts = frame_counts(each)
-        sentences = [element("p", element("b", escape(role.finding(each.undecided)))) for role in each.headline]
-        for one in each.balances:
-            graphs = [_dots(own, others) for covariate in one.covariates for _, own, others in covariate.parts]
-            sentences.append(_table(balance_table(one), graphs))
-        sentences += [element("p", escape(role.sentence)) for role in each.headline]
-        sentences += [element("p", escape(one.beside), class_="hint") for one in each.headline if one.asked]
-        sentences += [element("p", escape(one.sentence)) for one in each.weighted]
-        if each.simulated is not None:
-            sentences.append(element("p", escape(each.simulated.sentence)))
-        parts = [element("h2", escape(each.name)), element("p", escape(counts)), *sentences]
+    def _scenario(self, each: ScenarioEvaluation) -> Iterator[Markup]:
+        balances = [
+            _table(
+                balance_table(one), [_dots(*shares) for covariate in one.covariates for _, *shares in covariate.parts]
+            )
+            for one in each.balances
+        ]
         graphs = {
             "missed": [_whiskers(one.share, one.other) for one in (*each.roles, each.all_objects)],
             "slices": [_whiskers(one.share, one.other) for one in each.slices],
         }
-        parts += [_table(shown, graphs.get(shown[0], ())) for shown in tables(each, self._evaluation.within)]
+        shares = [_table(shown, graphs.get(shown[0], ())) for shown in tables(each, self._evaluation.within)]
         worst = each.worst[:SHOWN]
-        links = [
-            (
-                element("a", escape(one.frame), href=f"#{self._anchor(each, one)}"),
-                escape(one.recording),
-                f"{one.missed} of {one.of}",
-                f"{one.false}",
-            )
-            for one in worst
-        ]
-        parts.append(element("p", escape(_SIGNS), class_="hint"))
-        parts.append(table("Worst frames", ("frame", "recording", "missed", "false boxes"), links))
-        yield element("section", *parts, id=self._section(self._evaluation.scenarios.index(each)))
+        yield markup(
+            "evaluation", "scenario", anchor=self._section(self._evaluation.scenarios.index(each)), each=each,
+            counts=frame_counts(each), balances=balances, shares=shares, signs=_SIGNS,
+            worst=_table(worst_table(each, SHOWN), links=[self._anchor(each, one) for one in worst]),
+        )  # fmt: skip
         for one in worst:
             yield self._frame(each, one)
 
@@ -231,22 +213,16 @@ class _Model:
         place = next(number for number, other in enumerate(each.worst) if other is one)
         return f"{self._prefix}frame-{self._evaluation.scenarios.index(each)}-{place}"
 
-    def _frame(self, each: ScenarioEvaluation, one: WorstFrame) -> str:
+    def _frame(self, each: ScenarioEvaluation, one: WorstFrame) -> Markup:
         label = self._labels[one.frame]
         told = f"{one.recording}, {when(label.timestamp_us)}: {one.missed} of {one.of} missed, "
         told += _counted(one.false, "false box", "false boxes")
-        images = self._images(each, label)
-        cameras = element("ul", *images, class_="cameras wide", aria_label="Cameras") if images else ""
-        return element(
-            "section",
-            element("h3", escape(one.frame)),
-            element("p", escape(told), class_="hint"),
-            element("div", element("div", self._picture(each, label)), cameras, class_="run-body"),
-            id=self._anchor(each, one),
-            class_="run",
-        )
+        return markup(
+            "evaluation", "frame", anchor=self._anchor(each, one), name=one.frame, told=told,
+            picture=self._picture(each, label), images=self._images(each, label),
+        )  # fmt: skip
 
-    def _images(self, each: ScenarioEvaluation, label: Label) -> list[str]:
+    def _images(self, each: ScenarioEvaluation, label: Label) -> list[tuple[Sensor, str]]:
         """The images of a frame's cameras, those first that show the most objects in question."""
         boxes = list(self._boxes(each, label)) if label.cameras else []
         asked = [box for box in boxes if box.kind.endswith(_ASKED)]
@@ -257,10 +233,9 @@ class _Model:
 
         found = [sensor for sensor in self._files.find(label.sensors) if sensor.thumbnail]
         return [
-            element("li", element("a", camera_image(sensor, label.cameras.get(sensor.channel), boxes),
-                                  element("span", escape(sensor.channel)), href=sensor.link))
+            (sensor, camera_image(sensor, label.cameras.get(sensor.channel), boxes))
             for sensor in sorted(found, key=shown, reverse=True)
-        ]  # fmt: skip
+        ]
 
     def _kind(self, each: ScenarioEvaluation, number: int) -> str:
         """The style of a label object."""

@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from scenicq.errors import CannotEvaluate
 from scenicq.evaluate.density import GroupDensity
-from scenicq.evaluate.expression_arrays import UncomputedError
 from scenicq.evaluate.observed_columns import Observed
 from scenicq.evaluate.variables import Draws
 from scenicq.evaluate.weighting import log_weights
@@ -99,7 +99,7 @@ def _of_one_signature(
         counted = True
         try:
             values = each.values(labels)
-        except UncomputedError as why:
+        except CannotEvaluate as why:
             return [LogDensity(None, fixed=tuple(fixed), reason=str(why))] * len(labels)
         logs += values.log
         of_variables += values.log + values.log_size

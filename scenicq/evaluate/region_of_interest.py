@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scenicq.evaluate.annotations import Annotations, Frames
 from scenicq.evaluate.ego_poses import EgoPoses
 from scenicq.importers.predictions import Predictions
+from scenicq.number_ranges import expand_ranges
 from scenicq.store.dataset import Dataset
 
 __all__ = ["RegionOfInterest"]
@@ -148,7 +149,7 @@ def _runs(shapes: Iterable[Any], x: int, y: int, rows: int) -> tuple[Places, Pla
         found.append((high[~level], upper, upper))
         a, b, low, high = a[~level], b[~level], low[~level], high[~level]
         edge = np.repeat(np.arange(len(a)), high - low)
-        row = np.arange(len(edge)) - np.repeat(np.cumsum(high - low) - (high - low), high - low) + low[edge]
+        row = expand_ranges(low, high - low)
         # single precision, like the drawing that the benchmark uses: halves of a cell are common
         slope = (b[:, 0] - a[:, 0]).astype(np.float32) / (b[:, 1] - a[:, 1]).astype(np.float32)
         crossing = (row - a[edge, 1]).astype(np.float32) * slope[edge] + a[edge, 0].astype(np.float32)

@@ -10,7 +10,8 @@ from typing import Any, assert_never, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from scenicq.evaluate.expression_arrays import UncomputedError, points_of
+from scenicq.errors import CannotEvaluate
+from scenicq.evaluate.expression_arrays import points_of
 from scenicq.forest.columns import Array, Coded, Data, Placed, Vectors, distances
 from scenicq.forest.draws import draw_point
 from scenicq.forest.nodes import (
@@ -67,7 +68,7 @@ class Draws:
             args: Values of its distribution's parameters.
 
         Raises:
-            UncomputedError: It cannot be drawn in arrays.
+            CannotEvaluate: It cannot be drawn in arrays.
         """
         given: tuple[Any, ...] = args
         match leaf:
@@ -113,7 +114,7 @@ class Draws:
     def _points_of(self, regions: Data) -> Vectors:
         """Points of whichever region each draw has chosen."""
         if not isinstance(regions, Coded) or any(size > 1 for size in regions.which.shape[:-1]):
-            raise UncomputedError("a point of a region that hangs on the label")
+            raise CannotEvaluate("a point of a region that hangs on the label")
         x, y = np.empty((1, self.count)), np.empty((1, self.count))
         which = np.broadcast_to(regions.which, (1, self.count))
         for number in cast("list[int]", np.unique(which).tolist()):
@@ -127,14 +128,14 @@ class Draws:
         draw = draw_point(region)
         points = [draw(rng) for _ in range(count)]
         if any(isinstance(point, Undefined) for point in points):
-            raise UncomputedError("a point of an empty region")
+            raise CannotEvaluate("a point of an empty region")
         xy = np.array(points, dtype=np.float64).T
         return xy[0][None], xy[1][None]
 
 
 def _single(values: Array) -> float:
     if values.size != 1:
-        raise UncomputedError("a truncated normal with random parameters")
+        raise CannotEvaluate("a truncated normal with random parameters")
     return float(values.ravel()[0])
 
 
@@ -164,23 +165,23 @@ def density_of(leaf: Leaf, args: tuple[Data, ...], value: Array) -> Array:
                 bell = np.exp(-(((value - mean) / deviation) ** 2) / 2) / (deviation * math.sqrt(math.tau) * mass)
                 return np.where((low <= value) & (value <= high), bell, 0.0)
             case _:
-                raise UncomputedError("a variable without a density")
+                raise CannotEvaluate("a variable without a density")
 
 
 def point_density(region: Data, point: Vectors) -> Array:
     """The density of a uniform point of a region at some places.
 
     Raises:
-        UncomputedError: The region has no area of its own, such as a line, or hangs on what is hidden.
+        CannotEvaluate: The region has no area of its own, such as a line, or hangs on what is hidden.
     """
     if isinstance(region, Placed):
         return np.where(distances(region, *point) <= SLACK, 1 / _area(region), 0.0)
     only = region.options[0] if isinstance(region, Coded) and len(region.options) == 1 else None
     if not isinstance(only, Region):
-        raise UncomputedError("a point of what is no region")
+        raise CannotEvaluate("a point of what is no region")
     measured = area(only)
     if not measured:
-        raise UncomputedError("a point of a region without an area")
+        raise CannotEvaluate("a point of a region without an area")
     xy, shape = points_of(point)
     return contains_many(only, xy).reshape(shape) / measured
 

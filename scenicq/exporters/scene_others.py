@@ -12,6 +12,7 @@ from scenicq.forest.nodes import (
     ELEMENT,
     GIVEN,
     IDENTITY,
+    OPEN,
     RANK,
     TRACK,
     Among,
@@ -63,6 +64,8 @@ def _value(node: Among, objects: Sequence[ScenarioObject]) -> Node:
     def of(body: Node | None, index: int) -> Node:
         def step(each: Node) -> Node:
             if isinstance(each, Feature) and each.object == ELEMENT:
+                if each.property == OPEN:
+                    return build.constant(False)
                 if each.property in (IDENTITY, TRACK, RANK):
                     return build.constant(index)
                 return Feature(index, each.property, each.kind, span=each.span)

@@ -14,13 +14,14 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from scenicq.errors import CannotEvaluate
 from scenicq.forest.column_domain import ColumnDomain, first_direction
 from scenicq.forest.columns import DEFINED, UNDEFINED, UNKNOWN, Array, Coded, Column, Data, Placed, truth_of
-from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.interpret import Steps, interpret, steps_of
-from scenicq.forest.nodes import ELEMENT, RANK, Among, AmongOp, Body, Feature, Leaf, Node
+from scenicq.forest.nodes import ELEMENT, OPEN, RANK, Among, AmongOp, Body, Feature, Leaf, Node
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.walk import postorder
+from scenicq.number_ranges import expand_ranges
 
 __all__ = [
     "LABEL_OBJECTS", "LabelElements", "among_column", "asks_others", "concatenate", "properties_of_others", "take_rows",
@@ -69,7 +70,7 @@ def properties_of_others(scenario: Scenario) -> frozenset[str] | None:
         for node in postorder((todo.pop(),)):
             if isinstance(node, Among):
                 todo += node.body.parts
-            elif isinstance(node, Feature) and node.object == ELEMENT:
+            elif isinstance(node, Feature) and node.object == ELEMENT and node.property != OPEN:
                 found.add(node.property)
     return frozenset(found)
 
@@ -120,8 +121,7 @@ def _of_rows(elements: LabelElements, place: NDArray[np.intp], n: int) -> LabelE
     sizes = np.bincount(elements.place, minlength=n)
     firsts = np.cumsum(sizes) - sizes
     mine = sizes[place]
-    ends = np.cumsum(mine)
-    which = np.arange(int(mine.sum())) - np.repeat(ends - mine - firsts[place], mine)
+    which = expand_ranges(firsts[place], mine)
 
     def observed(name: str) -> Column:
         return take_rows(elements.observed(name), which, len(elements.place))

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.budget import look
+from scenicq.errors import CannotEvaluate
 from scenicq.forest.columns import (
     DEFINED,
     UNDEFINED,
@@ -34,7 +35,7 @@ from scenicq.forest.columns import (
     truth_of,
     value_reader,
 )
-from scenicq.forest.compute import FAR_M, CannotEvaluate, compute, directions
+from scenicq.forest.compute import FAR_M, compute, directions
 from scenicq.forest.interpret import OnMap, RegionNode
 from scenicq.forest.kinds import as_kind
 from scenicq.forest.nodes import (
@@ -76,7 +77,6 @@ from scenicq.geometry.measures import MovingBoxes, time_to_collision
 from scenicq.geometry.membership import contains_many, distance_many
 from scenicq.geometry.occupancy import ElementAtPoint
 from scenicq.geometry.regions import SLACK, PolygonSet, Region
-from scenicq.geometry.terms import UndecidedError
 
 __all__ = ["ColumnDomain", "first_direction"]
 
@@ -318,7 +318,7 @@ class ColumnDomain:
             mine = places.defined[which == number]
             try:
                 said = ask(cast(Region, regions.options[number]), places, mine)
-            except UndecidedError:
+            except CannotEvaluate:
                 # each place by itself, as geometry cannot answer at some of them
                 return self._each(partial(compute, node), args)
             found = np.zeros(places.count, dtype=said.dtype) if found is None else found
@@ -399,7 +399,7 @@ def _of_points(
 
 def _of_boxes(box: Placed, region: Region, places: ColumnPlaces, mine: NDArray[np.intp]) -> Array:
     if not isinstance(region, PolygonSet):
-        raise UndecidedError("whether a box lies in it")
+        raise CannotEvaluate("whether a box lies in it")
     numbers = [places.spread(each)[mine] for each in (*box.center, *box.numbers)]
     return covers_many(region, box_polygons(*numbers))
 

@@ -8,11 +8,10 @@ raises `CannotEvaluate`, which the matcher reports as unknown, never as no.
 from __future__ import annotations
 
 import math
-import operator
-from collections.abc import Callable
 from functools import lru_cache
 from typing import Any, cast
 
+from scenicq.errors import CannotEvaluate
 from scenicq.forest.kinds import kind_of_value
 from scenicq.forest.nodes import (
     AheadInLanes,
@@ -21,7 +20,6 @@ from scenicq.forest.nodes import (
     ArithmeticOp,
     Bearing,
     Compare,
-    CompareOp,
     Constant,
     Contains,
     Coordinate,
@@ -34,7 +32,6 @@ from scenicq.forest.nodes import (
     Intersects,
     LaneCourse,
     Logic,
-    LogicOp,
     Measure,
     Node,
     Norm,
@@ -52,6 +49,7 @@ from scenicq.forest.nodes import (
     VectorOf,
     VectorSum,
 )
+from scenicq.forest.scalars import arithmetic, compare, connect
 from scenicq.forest.walk import children, is_leaf
 from scenicq.geometry.angles import azimuth, rotate, wrap
 from scenicq.geometry.boxes import box_polygon
@@ -75,94 +73,15 @@ from scenicq.geometry.regions import (
     union,
 )
 from scenicq.geometry.shapes import GeometryError
-from scenicq.geometry.terms import UndecidedError
 
-__all__ = ["FAR_M", "CannotEvaluate", "compute", "directions", "fold"]
+__all__ = ["FAR_M", "compute", "directions", "fold"]
 
 
 FAR_M = 1e12
 """Metres that stand for any greater distance along a course, with which can be reckoned."""
 
 
-class CannotEvaluate(Exception):
-    """A question that plain evaluation cannot answer; the message says which."""
-
-
 _Numbers = tuple[float, ...]
-
-
-def _floor(args: _Numbers) -> float:
-    return float(math.floor(args[0]))
-
-
-def _ceil(args: _Numbers) -> float:
-    return float(math.ceil(args[0]))
-
-
-def _power(args: _Numbers) -> float:
-    """A power, where it is real (`math.pow` refuses what is not)."""
-    return math.pow(args[0], args[1])
-
-
-def _unary(function: Callable[[float], float]) -> Callable[[_Numbers], float]:
-    return lambda args: function(args[0])
-
-
-def _binary(function: Callable[[float, float], float]) -> Callable[[_Numbers], float]:
-    return lambda args: function(args[0], args[1])
-
-
-_SCALAR: dict[ArithmeticOp, Callable[[_Numbers], float]] = {
-    ArithmeticOp.ADD: sum,
-    ArithmeticOp.SUB: _binary(operator.sub),
-    ArithmeticOp.MUL: _binary(operator.mul),
-    ArithmeticOp.DIV: lambda args: args[0] / args[1],
-    ArithmeticOp.FLOORDIV: lambda args: args[0] // args[1],
-    ArithmeticOp.MOD: _binary(operator.mod),
-    ArithmeticOp.POW: _power,
-    ArithmeticOp.NEG: _unary(operator.neg),
-    ArithmeticOp.ABS: _unary(abs),
-    ArithmeticOp.MIN: min,
-    ArithmeticOp.MAX: max,
-    ArithmeticOp.SQRT: _unary(math.sqrt),
-    ArithmeticOp.SIN: _unary(math.sin),
-    ArithmeticOp.COS: _unary(math.cos),
-    ArithmeticOp.TAN: _unary(math.tan),
-    ArithmeticOp.ASIN: _unary(math.asin),
-    ArithmeticOp.ACOS: _unary(math.acos),
-    ArithmeticOp.ATAN: _unary(math.atan),
-    ArithmeticOp.ATAN2: _binary(math.atan2),
-    ArithmeticOp.EXP: _unary(math.exp),
-    ArithmeticOp.LOG: _unary(math.log),
-    ArithmeticOp.FLOOR: _floor,
-    ArithmeticOp.CEIL: _ceil,
-    ArithmeticOp.WRAP: _unary(wrap),
-}
-
-_ORDER: dict[CompareOp, Callable[[float, float], bool]] = {
-    CompareOp.LT: operator.lt,
-    CompareOp.LE: operator.le,
-    CompareOp.GT: operator.gt,
-    CompareOp.GE: operator.ge,
-}
-
-
-def _arithmetic(op: ArithmeticOp, args: tuple[Value, ...]) -> Value:
-    try:
-        result = _SCALAR[op](cast(_Numbers, args))
-    except (ZeroDivisionError, ValueError, OverflowError):
-        return Undefined(f"`{op.value}` has no value at {', '.join(f'{arg:.6g}' for arg in cast(_Numbers, args))}")
-    return float(result) if math.isfinite(result) else Undefined(f"`{op.value}` has no finite value here")
-
-
-def _logic(op: LogicOp, args: tuple[Value, ...]) -> Value:
-    if op is LogicOp.NOT:
-        return args[0] if isinstance(args[0], Undefined) else not args[0]
-    decisive = op is LogicOp.OR
-    known = [bool(arg) for arg in args if not isinstance(arg, Undefined)]
-    if decisive in known:
-        return decisive
-    return next((arg for arg in args if isinstance(arg, Undefined)), not decisive)
 
 
 def _intersects(left: Region, right: Region) -> bool:
@@ -246,7 +165,7 @@ def compute(node: Node, args: tuple[Value, ...]) -> Value:
                 raise CannotEvaluate(f"what {picked!r} picks")
             return args[1 + int(picked)]
         case Logic():
-            return _logic(node.op, args)
+            return connect(node.op, args)
         case _:
             pass
     for arg in args:
@@ -254,8 +173,6 @@ def compute(node: Node, args: tuple[Value, ...]) -> Value:
             return arg
     try:
         return _compute(node, args)
-    except UndecidedError as error:
-        raise CannotEvaluate(str(error)) from None
     except (ArithmeticError, TypeError, ValueError, GeometryError) as error:
         # such as numbers that are finite and whose sum is not
         raise CannotEvaluate(f"{type(node).__name__} of these values: {error}") from None
@@ -264,8 +181,10 @@ def compute(node: Node, args: tuple[Value, ...]) -> Value:
 def _compute(node: Node, args: tuple[Value, ...]) -> Value:
     given = cast("tuple[object, ...]", args)
     match node, given:
+        case Arithmetic(op=ArithmeticOp.WRAP), (angle,):
+            return wrap(cast(float, angle))
         case Arithmetic(), _:
-            return _arithmetic(node.op, args)
+            return arithmetic(node.op, cast(_Numbers, args))
         case Coordinate(), ((float() as x, float() as y),):
             return y if node.axis else x
         case Norm(), ((float() as x, float() as y),):
@@ -281,9 +200,7 @@ def _compute(node: Node, args: tuple[Value, ...]) -> Value:
         case Rotate(), ((float() as x, float() as y), float() as angle):
             return rotate(x, y, angle)
         case Compare(), (left, right):
-            if node.op in _ORDER:
-                return _ORDER[node.op](cast(float, left), cast(float, right))
-            return (left == right) == (node.op is CompareOp.EQ)
+            return compare(node.op, cast(Value, left), cast(Value, right))
         case _:
             return _compute_region(node, args)
 

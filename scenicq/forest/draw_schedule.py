@@ -13,7 +13,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Protocol, cast
 
-from scenicq.forest.compute import CannotEvaluate, compute, directions
+from scenicq.errors import CannotEvaluate
+from scenicq.forest.compute import compute, directions
 from scenicq.forest.draws import draw_leaf, draw_point
 from scenicq.forest.inline import Check
 from scenicq.forest.nodes import Constant, DirectionAt, Feature, Identity, Leaf, Node, PointIn, Undefined, Value, Vector

@@ -9,7 +9,8 @@ import math
 from collections.abc import Callable, Mapping
 from typing import cast
 
-from scenicq.forest.compute import CannotEvaluate, compute, directions
+from scenicq.errors import CannotEvaluate
+from scenicq.forest.compute import compute, directions
 from scenicq.forest.kinds import as_kind
 from scenicq.forest.nodes import (
     DirectionAt,

@@ -14,7 +14,7 @@ from collections.abc import Mapping, Set
 from dataclasses import dataclass, replace
 
 from scenicq.budget import look
-from scenicq.forest.compute import CannotEvaluate
+from scenicq.errors import CannotEvaluate
 from scenicq.forest.containment_pruning import shrink_regions
 from scenicq.forest.draw_schedule import DrawSchedule, lay_out
 from scenicq.forest.inline import Check, assemble

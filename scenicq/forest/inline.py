@@ -10,11 +10,11 @@ import itertools
 from collections.abc import Callable, Iterator, Mapping, Set
 from dataclasses import dataclass
 
-from scenicq.errors import Span
+from scenicq.errors import CannotEvaluate, Span
 from scenicq.forest import build
 from scenicq.forest.angle_wrap import one_turn
 from scenicq.forest.collisions import apart, boxes
-from scenicq.forest.compute import CannotEvaluate, fold
+from scenicq.forest.compute import fold
 from scenicq.forest.condition import condition
 from scenicq.forest.nodes import (
     ArithmeticOp,

@@ -15,23 +15,25 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import StrEnum
 from itertools import count
-from typing import ClassVar, Literal, TypeAlias
+from typing import TYPE_CHECKING, ClassVar, Literal, TypeAlias
 
 from scenicq.errors import Span
-from scenicq.geometry.driven_courses import CoursePlace
-from scenicq.geometry.fields import VectorField
-from scenicq.geometry.measures import MeasureName
-from scenicq.geometry.network import Network
-from scenicq.geometry.regions import Region
+
+if TYPE_CHECKING:  # takes long to load, and whoever asks a solver about numbers needs none of it
+    from scenicq.geometry.driven_courses import CoursePlace
+    from scenicq.geometry.fields import VectorField
+    from scenicq.geometry.measures import MeasureName
+    from scenicq.geometry.network import Network
+    from scenicq.geometry.regions import Region
 
 __all__ = [
-    "CLOCK", "COURSE", "ELEMENT", "GIVEN", "GOING", "IDENTITY", "LAST_LANE", "MIRRORED", "PAST", "RANK", "TRACK", "WHO",
-    "AheadInLanes", "Among", "AmongOp", "Arithmetic", "ArithmeticOp", "Bearing", "Body", "Compare", "CompareOp",
-    "Constant", "Contains", "Coordinate", "Corridor", "CourseCoordinate", "DirectionAt", "DiscAt", "DiscreteRange",
-    "Distance", "Encloses", "Feature", "Identity", "Index", "Intersects", "Kind", "LaneCourse", "Leaf", "Logic",
-    "LogicOp", "Measure", "Node", "Norm", "Normal", "PointIn", "Range", "RectangleAt", "RegionDifference",
-    "RegionIntersection", "RegionUnion", "Rotate", "Scale", "SectorAt", "Select", "TruncatedNormal", "Undefined",
-    "Value", "Vector", "VectorOf", "VectorSum",
+    "CLOCK", "COURSE", "ELEMENT", "GIVEN", "GOING", "IDENTITY", "LAST_LANE", "MIRRORED", "OPEN", "PAST", "RANK",
+    "TRACK", "WHO", "AheadInLanes", "Among", "AmongOp", "Arithmetic", "ArithmeticOp", "Bearing", "Body", "Compare",
+    "CompareOp", "Constant", "Contains", "Coordinate", "Corridor", "CourseCoordinate", "DirectionAt", "DiscAt",
+    "DiscreteRange", "Distance", "Encloses", "Feature", "Identity", "Index", "Intersects", "Kind", "LaneCourse",
+    "Leaf", "Logic", "LogicOp", "Measure", "Node", "Norm", "Normal", "PointIn", "Range", "RectangleAt",
+    "RegionDifference", "RegionIntersection", "RegionUnion", "Rotate", "Scale", "SectorAt", "Select",
+    "TruncatedNormal", "Undefined", "Value", "Vector", "VectorOf", "VectorSum",
 ]  # fmt: skip
 
 Vector: TypeAlias = tuple[float, float]
@@ -49,7 +51,7 @@ class Undefined:
     reason: str
 
 
-Value: TypeAlias = float | bool | str | Vector | Region | VectorField | CoursePlace | Undefined | None
+Value: TypeAlias = "float | bool | str | Vector | Region | VectorField | CoursePlace | Undefined | None"
 
 COURSE = "driven course"
 """The property of an object that is its course; no program can give one of such a name."""
@@ -526,6 +528,8 @@ ELEMENT, GIVEN = -2, -3
 IDENTITY, TRACK, RANK = "#id", "#track", "#rank"
 """Properties of whoever plays an object, as numbers: who it is, where it is observed; who it is, wherever it is; its
 place among the ids of its label."""
+OPEN = "#open"
+"""A truth value that no label object has: what hangs on it is unknown."""
 WHO = frozenset({IDENTITY, TRACK, RANK})
 """All of these: what is known of whoever plays a role, whatever a label observes of it."""
 

@@ -41,6 +41,7 @@ from scenicq.geometry import shapes
 from scenicq.geometry.regions import PolygonSet, PolylineSet, Region, UnionOf
 from scenicq.geometry.sampling import sampler
 from scenicq.geometry.shapes import Coordinates
+from scenicq.number_ranges import expand_ranges
 
 __all__ = ["Window", "close_boxes", "close_points"]
 
@@ -110,7 +111,7 @@ def _densest(region: PolylineSet, radius: float) -> float:
     # pieces no longer than a side lie within half of one of their middles
     counts = np.maximum(np.ceil(length / side), 1).astype(int)
     owner = np.repeat(np.arange(len(edges)), counts)
-    step = np.arange(len(owner)) - np.repeat(np.cumsum(counts) - counts, counts)
+    step = expand_ranges(0, counts)
     middles = edges[owner, :2] + along[owner] * ((step + 0.5) / counts[owner])[:, None]
     squares: Counter[tuple[int, int]] = Counter()
     for (column, row), part in zip(

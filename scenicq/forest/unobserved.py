@@ -1,6 +1,7 @@
 """Conditions on what a label does not observe: between what surely holds and what may hold lies what is unknown.
 
-How an object moves (`MOTION`) is only ever observed, as no default of a class says it. A condition that reads what is
+How an object moves (`MOTION`) is only ever observed, as no default of a class says it, and so are attributes that a
+program reads of labels without giving its objects any. A condition that reads what is
 not observed is replaced by two that do not: one that holds only where the condition surely does, one that holds
 wherever it may (Kleene's logic).
 
@@ -18,7 +19,10 @@ from scenicq.forest import build
 from scenicq.forest.course_ends import Truths, has_ends, join, opposite, truths_by_ends
 from scenicq.forest.kinds import kind_of
 from scenicq.forest.nodes import (
+    CLOCK,
     MIRRORED,
+    PAST,
+    WHO,
     Among,
     Arithmetic,
     ArithmeticOp,
@@ -33,14 +37,24 @@ from scenicq.forest.nodes import (
     Select,
     VectorOf,
 )
+from scenicq.forest.scenario import Scenario
 from scenicq.forest.value_numbers import ValueNumbers, is_total, without_negation
 from scenicq.forest.walk import children, postorder, transform
 from scenicq.limits import LIMITS
 
-__all__ = ["MOTION", "certain_and_possible", "is_open", "with_any_value"]
+__all__ = ["MOTION", "certain_and_possible", "is_only_observed", "is_open", "with_any_value"]
 
 MOTION = frozenset({"speed", "velocity", "acceleration", "angularSpeed"})
 """Properties that say how an object moves."""
+
+
+def is_only_observed(scenario: Scenario, index: int, name: str) -> bool:
+    """Whether labels alone tell a property of an object: how it moves, or what the program does not say of it."""
+    if name in MOTION:
+        return True
+    if index < 0 or name in (*WHO, CLOCK) or name.startswith(PAST):
+        return False
+    return name not in scenario.every_object[index].properties
 
 
 def is_open(node: Node, unobserved: Callable[[Feature | Among], bool]) -> bool:

@@ -18,8 +18,9 @@ from scenicq.geometry.cell_guards import segment_distances
 from scenicq.geometry.fields import FieldCell
 from scenicq.geometry.road_cells import Outline, convex_outlines, segment_cells
 from scenicq.geometry.shapes import Bounds, Coordinates, Shape
+from scenicq.number_ranges import expand_ranges
 
-__all__ = ["ONE_HEADING", "TIE", "AreaPairs", "DirectedAreas", "DirectedLane", "distinct_pairs"]
+__all__ = ["ONE_HEADING", "TIE", "AreaPairs", "DirectedAreas", "DirectedLane", "distinct_pairs", "rotated"]
 
 TIE = 1e-9
 """Metres within which distances are the same."""
@@ -156,14 +157,33 @@ class DirectedAreas:
         """Pairs (point, segment) of the nearest segments of each point's areas, and those farther by no more."""
         segments, _, starts = self.segments
         point, area = pairs
-        counts = starts[area + 1] - starts[area]
-        pair = np.repeat(np.arange(len(area)), counts)
-        segment = np.arange(len(pair)) - np.repeat(np.cumsum(counts) - counts, counts) + starts[area][pair]
+        pair, segment = _each_segment(np.arange(len(area)), area, starts)
         away = segment_distances(xy[point[pair]], segments[segment])
         best = np.full(len(area), np.inf)
         np.minimum.at(best, pair, away)
         chosen = np.nonzero(away <= best[pair] + more[point[pair]] + TIE)[0]
         return point[pair[chosen]], segment[chosen]
+
+    def steps_to(
+        self, xy: Coordinates, steps: Coordinates, beside: float
+    ) -> tuple[NDArray[np.intp], NDArray[np.float64], Coordinates]:
+        """Where a step along a segment may have led to some places (n, 2): pairs (place, heading), and from where.
+
+        Args:
+            xy: The places.
+            steps: By which vector of heading 0 each is reached, (n, 2).
+            beside: Metres beside a segment up to which one goes along it.
+        """
+        if not len(self):
+            return np.empty(0, dtype=np.intp), np.empty(0), np.empty((0, 2))
+        segments, headings, starts = self.segments
+        point, area = shapes.tree_pairs_around(self.tree, xy, np.hypot(steps[:, 0], steps[:, 1])[:, None])
+        place, segment = _each_segment(point, area, starts)
+        back = xy[place] - rotated(steps[place], headings[segment])
+        near = np.nonzero(segment_distances(back, segments[segment]) <= beside)[0]
+        place, segment = place[near], segment[near]
+        _, first = np.unique(place * len(segments) + self._rounded[1][segment], return_index=True)
+        return place[first], headings[segment[first]], back[near[first]]
 
     def covering(self, boxes: NDArray[np.float64], pairs: AreaPairs) -> NDArray[np.bool_]:
         """Which of some boxes (n, 4) one of their areas covers."""
@@ -200,6 +220,18 @@ class DirectedAreas:
                 own = headings[starts[area] : starts[area + 1]]
                 found = self._cells_of[area, index] = segment_cells(self._outlines[area], segments, own, index)
             yield from found
+
+
+def rotated(xy: Coordinates, angles: NDArray[np.float64]) -> Coordinates:
+    """Vectors (n, 2) turned counter-clockwise by angles (n,)."""
+    cos, sin = np.cos(angles), np.sin(angles)
+    return np.column_stack([xy[:, 0] * cos - xy[:, 1] * sin, xy[:, 0] * sin + xy[:, 1] * cos])
+
+
+def _each_segment(owner: NDArray[np.intp], area: NDArray[np.intp], starts: NDArray[np.intp]) -> AreaPairs:
+    """Pairs (owner, segment) for all segments of each owner's area."""
+    counts = starts[area + 1] - starts[area]
+    return np.repeat(owner, counts), expand_ranges(starts[area], counts)
 
 
 def headings_by_point(owner: NDArray[np.intp], heading: NDArray[np.float64], count: int) -> list[tuple[float, ...]]:

@@ -17,6 +17,7 @@ from shapely import STRtree
 from scenicq.budget import look
 from scenicq.geometry import shapes
 from scenicq.geometry.cells import convex_parts
+from scenicq.geometry.directed_areas import rotated
 from scenicq.geometry.fields import FieldCell
 from scenicq.geometry.road_direction import ONE_HEADING, RoadDirection, distinct_pairs
 from scenicq.geometry.shapes import Bounds, Coordinates, Shape
@@ -63,6 +64,19 @@ class FollowedDirection(RoadDirection):
         owner, heading = self.base.headings(boxes)
         off = self._partly_off(boxes)
         return distinct_pairs(np.concatenate([owner, off]), np.concatenate([heading, np.full(len(off), OFF_ROAD)]))
+
+    def steps_to(
+        self, xy: Coordinates, steps: Coordinates
+    ) -> tuple[NDArray[np.intp], NDArray[np.float64], Coordinates]:
+        """Where a step may have led to some places, see `RoadDirection`, also off the road."""
+        place, heading, back = self.base.steps_to(xy, steps)
+        off = xy - rotated(steps, np.full(len(xy), OFF_ROAD))
+        free = self._partly_off(np.concatenate([off, off], axis=1))
+        return (
+            np.concatenate([place, free]),
+            np.concatenate([heading, np.full(len(free), OFF_ROAD)]),
+            np.concatenate([back, off[free]]),
+        )
 
     def cells(self, bounds: Bounds) -> list[FieldCell]:
         """Convex cells that hold every (point, heading) within the bounds; those of lanes and tiles stay whole."""

@@ -134,7 +134,7 @@ def distance(region: Region, x: float, y: float) -> float:
     """Distance from a point to a region in metres: 0 inside, inf if the region is empty.
 
     Raises:
-        UndecidedError: The region removes too many separate discs for an exact answer.
+        CannotEvaluate: The region removes too many separate discs for an exact answer.
     """
     match region:
         case Everywhere():
@@ -167,7 +167,7 @@ def distance_many(region: Region, xy: NDArray[np.float64]) -> NDArray[np.float64
     """`distance` for points of shape (n, 2), (n,).
 
     Raises:
-        UndecidedError: As of `distance`, for one of the points.
+        CannotEvaluate: As of `distance`, for one of the points.
     """
     match region:
         case PolygonSet() | PolylineSet() | PointSet() if region.pieces:
@@ -185,7 +185,7 @@ def nearest_point(region: Region, x: float, y: float) -> XY | None:
     """The point of a region that is nearest to (x, y), or None if the region is empty.
 
     Raises:
-        UndecidedError: The region removes too many separate discs for an exact answer.
+        CannotEvaluate: The region removes too many separate discs for an exact answer.
     """
     if contains(region, x, y):
         return x, y

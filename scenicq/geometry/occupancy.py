@@ -363,18 +363,6 @@ class Occupancy:
         return [shape for shape in self._meeting(trees, area) if shape is not area and self._overlap(area, shape)]
 
     @cached_property
-    def spans(self) -> dict[str, tuple[float, float]]:
-        """By the id of each area of the first layer a heading, and how far from it its owner turns at most."""
-        found: dict[str, tuple[float, float]] = {}
-        known: dict[int, tuple[float, float]] = {}
-        for name, (_, _, owner) in zip(self.elements[0], self.layers[0], strict=True):
-            way = self.ways[0][owner]
-            if owner not in known:
-                known[owner] = (0.0, math.inf) if way is None else way.span
-            found[name] = known[owner]
-        return found
-
-    @cached_property
     def _trees(self) -> tuple[STRtree, ...]:
         return tuple(STRtree([area for area, _, _ in layer]) for layer in self.layers)
 

@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 from shapely import STRtree
 
 from scenicq.budget import look
+from scenicq.errors import CannotEvaluate
 from scenicq.geometry import shapes
 from scenicq.geometry.closest import nearest_on_circles
 from scenicq.geometry.membership import bounds, contains_many, nearest_point
 from scenicq.geometry.outlines import outline
 from scenicq.geometry.regions import Disc, Everywhere, PointSet, PolygonSet, PolylineSet, Region, UnionOf
 from scenicq.geometry.shapes import Bounds, Coordinates
-from scenicq.geometry.terms import UndecidedError, overlap
+from scenicq.geometry.terms import overlap
 
 __all__ = ["nearest_points"]
 
@@ -116,7 +117,7 @@ def _one_by_one(region: Region, xy: Coordinates) -> Coordinates:
         look()
         try:
             point = nearest_point(region, x, y)
-        except UndecidedError:
+        except CannotEvaluate:
             return found
         if point is not None:
             found[number] = point

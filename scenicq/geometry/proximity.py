@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from shapely.geometry import Point
 
+from scenicq.errors import CannotEvaluate
 from scenicq.geometry import shapes
 from scenicq.geometry.closest import closest_point
 from scenicq.geometry.membership import contains, distance
@@ -33,7 +34,7 @@ from scenicq.geometry.regions import (
     UnionOf,
 )
 from scenicq.geometry.shapes import XY, Bounds, Shape
-from scenicq.geometry.terms import Circle, Term, UndecidedError, both, rectangle_shape, terms
+from scenicq.geometry.terms import Circle, Term, both, rectangle_shape, terms
 
 __all__ = ["meets", "meets_many", "witness_point"]
 
@@ -53,7 +54,7 @@ def meets(region: Region, shape: Shape, radius: float = 0.0) -> bool | None:
         return False
     try:
         return _meets(region, shape, radius)
-    except UndecidedError:
+    except CannotEvaluate:
         return None
 
 
@@ -96,7 +97,7 @@ def witness_point(region: Region, shape: Shape, radius: float = 0.0) -> XY | Non
                     if inner is not None and contains(region, *inner):
                         return inner
                     best = best or closest_point(shared, *shapes.inner_point(shape))
-    except UndecidedError:
+    except CannotEvaluate:
         return best
     return best
 
@@ -125,12 +126,12 @@ def _meets(region: Region, shape: Shape, radius: float) -> bool:
 
 
 def _any_part(parts: tuple[Region, ...], shape: Shape, radius: float) -> bool:
-    undecided: UndecidedError | None = None
+    undecided: CannotEvaluate | None = None
     for part in parts:
         try:
             if _meets(part, shape, radius):
                 return True
-        except UndecidedError as error:
+        except CannotEvaluate as error:
             undecided = error
     if undecided is not None:
         raise undecided

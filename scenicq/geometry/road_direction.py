@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from shapely import LineString
 
 from scenicq.geometry import shapes
-from scenicq.geometry.angles import azimuth_array, wrap_array
 from scenicq.geometry.cell_guards import Off
 from scenicq.geometry.directed_areas import ONE_HEADING, TIE, AreaPairs, DirectedAreas, DirectedLane, distinct_pairs
 from scenicq.geometry.direction_surroundings import OffLanes
@@ -32,6 +31,8 @@ REACH = 20.0
 _BESIDE = 0.01
 """Metres beside a polyline that count as on it."""
 _CHUNK = 20_000
+_WIDE = 3.0
+"""Metres beside a centreline up to which most places of its lane lie."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,6 +101,12 @@ class RoadDirection:
             found.append((owner + start, heading))
         return np.concatenate([owner for owner, _ in found]), np.concatenate([heading for _, heading in found])
 
+    def steps_to(
+        self, xy: Coordinates, steps: Coordinates
+    ) -> tuple[NDArray[np.intp], NDArray[np.float64], Coordinates]:
+        """Where a step along a lane may have led to some places, see `DirectedAreas`; not all of these lead there."""
+        return self._lanes.steps_to(xy, steps, _WIDE)
+
     def cells(self, bounds: Bounds) -> list[FieldCell]:
         """Convex cells that hold every (point, heading) within the bounds; those of lanes stay whole."""
         return self._cells_near(bounds, None)
@@ -122,19 +129,6 @@ class RoadDirection:
                 part = FieldCell(cell.polygon, cell.heading, (*cell.guards, *off)).part(bounds)
                 found += [part] if part is not None else []
         return found + self._surroundings.cells(bounds)
-
-    @cached_property
-    def span(self) -> tuple[float, float]:
-        """A heading, and how far from it any segment of the lanes leads at most, in radians; 0 and inf for none."""
-        lines = [line for lane in (*self.lanes, *self.beside) for line in lane.centerline] + list(self.elsewhere)
-        steps = np.concatenate([np.empty((0, 2)), *(np.diff(np.asarray(line), axis=0) for line in lines)])
-        steps = steps[(steps != 0).any(axis=1)]
-        if not len(steps):
-            return 0.0, math.inf
-        headings = azimuth_array(*steps.T)
-        turns = wrap_array(headings - headings[0])
-        middle = float(turns.min() + turns.max()) / 2
-        return float(headings[0]) + middle, float(np.ptp(turns)) / 2
 
     @cached_property
     def _lanes(self) -> DirectedAreas:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from shapely.geometry import LineString, Polygon
 
 from scenicq.budget import look
+from scenicq.errors import CannotEvaluate
 from scenicq.geometry import shapes
 from scenicq.geometry.angles import direction, rotate
 from scenicq.geometry.membership import bounds, contains
@@ -35,7 +36,7 @@ from scenicq.geometry.regions import (
     UnionOf,
 )
 from scenicq.geometry.shapes import XY
-from scenicq.geometry.terms import Term, UndecidedError, terms
+from scenicq.geometry.terms import Term, terms
 from scenicq.limits import LIMITS
 
 __all__ = ["sample", "sampler"]
@@ -125,7 +126,7 @@ def _apart(region: Region, proposal: _Proposal) -> _Proposal | None:
         return proposal
     try:
         pieces = shapes.simple_parts([_straightened(term) for term in terms(region, (west, south, east, north))])
-    except UndecidedError:
+    except CannotEvaluate:
         return proposal
     if proposal.dimension == 1:
         lines = tuple(piece for piece in pieces if isinstance(piece, LineString))

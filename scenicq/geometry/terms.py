@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import assert_never
 
+from scenicq.errors import CannotEvaluate
 from scenicq.geometry import shapes
 from scenicq.geometry.angles import direction
 from scenicq.geometry.boxes import corners
@@ -33,16 +34,12 @@ from scenicq.geometry.regions import (
 from scenicq.geometry.shapes import Bounds, Shape
 from scenicq.limits import LIMITS
 
-__all__ = ["Circle", "Term", "UndecidedError", "both", "overlap", "rectangle_shape", "terms"]
+__all__ = ["Circle", "Term", "both", "overlap", "rectangle_shape", "terms"]
 
 _MANY_CORNERS = 256
 """Polygons with more corners are cut to the neighbourhood first."""
 _PAD = 1e-6
 """Metres around a term's box, so that it has an area and its border lies beyond the reach of `SLACK`."""
-
-
-class UndecidedError(ValueError):
-    """A region removes too many separate discs for an exact answer."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +79,7 @@ def terms(region: Region, box: Bounds) -> Iterator[Term]:
     """The region as a union of terms that are right inside a finite box (outside of it they may hold more or less).
 
     Raises:
-        UndecidedError: The region removes too many discs.
+        CannotEvaluate: The region removes too many discs.
     """
     if box[0] > box[2] or box[1] > box[3]:
         return
@@ -194,7 +191,7 @@ def _without(term: Term, removed: Region, box: Bounds) -> list[Term]:
             for circle in outside:
                 cut += _reduced(Term(old.clip, (*old.inside, circle), old.outside))
         if len(cut) > LIMITS.difference_terms:
-            raise UndecidedError("the region removes too many separate discs")
+            raise CannotEvaluate("the region removes too many separate discs")
         left = cut
     return left
 

@@ -20,7 +20,16 @@ from scenicq.importers.folders import readable
 from scenicq.importers.opendrive import convert_maps
 from scenicq.importers.registry import choose_importer
 from scenicq.importers.report import Report
-from scenicq.importers.segments import Job, RecordingTask, SegmentPlace, World, fingerprint, maps_digest, write_segments
+from scenicq.importers.segments import (
+    Job,
+    RecordingTask,
+    SegmentPlace,
+    World,
+    fingerprint,
+    is_on_maps,
+    map_digests,
+    write_segments,
+)
 from scenicq.store.manifest import LeftOut, Manifest, Provenance, is_dataset
 from scenicq.store.segment import SEGMENT_OBJECTS, is_whole, read_segments, segments_of
 from scenicq.store.writer import DatasetWriter
@@ -127,7 +136,9 @@ def ingest(
         ]
         reached = _Reached(opened.frames, progress)
         known = _known(writer, target_path if update and not force else None)
-        reused = _write_all(opened, writer, groups, known, strict=strict, jobs=jobs, reached=reached)
+        # some importers take the first map that is given
+        context = (opened.context, repr(list(converted)), str(strict))
+        reused = _write_all(opened, writer, groups, known, context, strict=strict, jobs=jobs, reached=reached)
         for segment in writer.segments:
             for piece in segment.pieces.values():
                 report.merge(piece.counts, piece.told)
@@ -213,14 +224,15 @@ def _write_all(
     writer: DatasetWriter,
     groups: Sequence[Sequence[Entry]],
     known: _EarlierWork,
+    context: Sequence[str],
     *,
     strict: bool,
     jobs: int | None,
     reached: _Reached,
 ) -> int:
     """Write or take over every segment; the result is the number of recordings that were taken over."""
-    context = (opened.context, maps_digest(opened.maps), str(strict))
-    world = World(writer.folder, opened.maps, strict)
+    digests = map_digests(opened.maps)
+    world = World(writer.folder, opened.maps, digests, strict)
     whole: dict[tuple[Path, int], bool] = {}
     reused: dict[int, int] = {}
     todo = {number: frozenset[tuple[str, str]]() for number in range(len(groups))}
@@ -232,13 +244,15 @@ def _write_all(
             reused[number] = 0
             mark = fingerprint(context, groups[number], taken)
             found = known.segments.get((mark, number)) or known.segments.get((mark, None))
-            if found is not None:
+            if found is not None and is_on_maps(found.segment.pieces.values(), digests):
                 moves.append((number, found))
                 continue
             shares: list[RecordingTask] = []
             for entry in groups[number]:
                 own = fingerprint(context, [entry], frozenset(each for each in taken if each[0] == entry.name))
                 old = known.pieces.get(own)
+                if old is not None and not is_on_maps([old.segment.pieces[entry.name]], digests):
+                    old = None
                 if old is not None:
                     if (old.folder, old.number) not in whole:
                         whole[old.folder, old.number] = is_whole(old.segment, old.folder, old.number)

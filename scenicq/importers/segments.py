@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, field
 from itertools import accumulate, groupby, pairwise
@@ -32,7 +32,16 @@ if TYPE_CHECKING:
     from scenicq.geometry.features import MapFeature
     from scenicq.store.part_rows import PartRows
 
-__all__ = ["Job", "RecordingTask", "SegmentPlace", "World", "fingerprint", "maps_digest", "write_segments"]
+__all__ = [
+    "Job",
+    "RecordingTask",
+    "SegmentPlace",
+    "World",
+    "fingerprint",
+    "is_on_maps",
+    "map_digests",
+    "write_segments",
+]
 
 _MOST_MESSAGES = 10_000
 """Messages of the recordings of a segment that are kept for later ingests; what has more is read anew then."""
@@ -53,11 +62,13 @@ class World:
     Attributes:
         folder: The folder of the dataset that grows.
         maps: Elements of each map.
+        digests: What changes with any element of a map, by its name.
         strict: Whether the first problem is an error.
     """
 
     folder: Path
     maps: Mapping[str, Sequence[MapFeature]] = field(repr=False)
+    digests: Mapping[str, str] = field(default_factory=dict[str, str], repr=False)
     strict: bool = False
 
 
@@ -82,7 +93,7 @@ class RecordingTask:
 
     Attributes:
         name: The recording's name.
-        fingerprint: What changes with all that it depends on.
+        fingerprint: What changes with all that it depends on but its map.
         reader: Reads the recording alone.
         old: A segment that has it already.
     """
@@ -100,7 +111,7 @@ class Job:
     Attributes:
         number: The segment's number.
         shares: Its recordings, in order.
-        fingerprint: What changes with all that it depends on.
+        fingerprint: What changes with all that it depends on but the maps of its recordings.
         taken: Recording and frame of labels that are left out, because earlier recordings use the same name.
     """
 
@@ -111,7 +122,9 @@ class Job:
 
 
 def fingerprint(context: Sequence[str], entries: Sequence[Entry], taken: frozenset[tuple[str, str]]) -> str:
-    """What changes with everything that a segment, or a recording of it, depends on.
+    """What changes with everything that a segment, or a recording of it, depends on, but for their maps.
+
+    Which map a recording is on is known when it is read (`is_on_maps`).
 
     Args:
         context: What all segments of an ingest depend on.
@@ -122,20 +135,31 @@ def fingerprint(context: Sequence[str], entries: Sequence[Entry], taken: frozens
     return hashlib.blake2b(json.dumps(content).encode(), digest_size=16).hexdigest()
 
 
-def maps_digest(maps: Mapping[str, Sequence[MapFeature]]) -> str:
-    """What changes with any element of any map."""
-    digest = hashlib.blake2b(digest_size=16)
+def map_digests(maps: Mapping[str, Sequence[MapFeature]]) -> dict[str, str]:
+    """What changes with any element of a map, by the map's name."""
     if not maps:
-        return digest.hexdigest()
+        return {}
     import shapely  # noqa: PLC0415 - slow to load, and for maps
 
-    for name in sorted(maps):
-        digest.update(json.dumps(name).encode())
-        shapes = shapely.to_wkb(np.array([feature.shape for feature in maps[name]], dtype=object))
-        for feature, shape in zip(maps[name], shapes, strict=True):
+    found: dict[str, str] = {}
+    for name, features in maps.items():
+        digest = hashlib.blake2b(digest_size=16)
+        shapes = shapely.to_wkb(np.array([feature.shape for feature in features], dtype=object))
+        for feature, shape in zip(features, shapes, strict=True):
             digest.update(json.dumps([feature.id, feature.kind, dict(feature.properties)]).encode())
             digest.update(shape)
-    return digest.hexdigest()
+        found[name] = digest.hexdigest()
+    return found
+
+
+def is_on_maps(recordings: Iterable[SourceRecording], digests: Mapping[str, str]) -> bool:
+    """Whether recordings were written with maps that are there, and what is not there was not.
+
+    Args:
+        recordings: What became of them.
+        digests: The `map_digests` of what is there.
+    """
+    return all(digests.get(name, "") == digest for each in recordings for name, digest in each.maps)
 
 
 def write_segments(
@@ -217,11 +241,13 @@ def _read(
 ) -> SourceRecording:
     """Read a recording from the source."""
     report = Report(strict=world.strict)
+    maps: dict[str, str] = {}
     for found in share.reader.recordings(Labels(world.maps.keys(), report, job.taken), report):
         tell_recording(found, report)
         writer.add(found, indexes.of(found.map))
         on_recording(found.name, len(found.frames))
-    return SourceRecording(share.fingerprint, report.tally, report.told)
+        maps[found.map] = world.digests.get(found.map, "")
+    return SourceRecording(share.fingerprint, report.tally, report.told, tuple(maps.items()))
 
 
 def _copy(

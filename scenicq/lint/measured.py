@@ -96,27 +96,21 @@ def _facing_objects(nodes: list[ast.SyntaxNode]) -> Iterator[Diagnostic]:
 def _signed(nodes: list[ast.SyntaxNode]) -> Iterator[Diagnostic]:
     """Angles that are bounded from above alone, by an amount: they may be as far to the right as they like."""
     pairs = [(node, *each) for node in nodes if isinstance(node, ast.ComparisonChain) for each in order_of(node)]
-    bounded_above = {text_of(low) for _, low, _ in pairs}
-    bounded_below = {text_of(high) for _, _, high in pairs}
-    for node, end, angle in pairs:
-        least = number(end)
-        if isinstance(angle, ast.Phrase) and is_angle(angle) and least is not None and _BACK < least < math.pi:
-            text = text_of(angle)
-            if text not in bounded_above:
+    right = "negative to the right"
+    for end_at, angle_at, least, sign, verb, why in (
+        (1, 2, _BACK, ">", "has", f"{right}, down to -180 deg: half of what faces the other way is left out"),
+        (2, 1, 0.0, "<", "bounds", f"{right}, so every angle to the right is below {{end}}"),
+    ):
+        bounded = {text_of(each[end_at]) for each in pairs}
+        for each in pairs:
+            end, angle = each[end_at], each[angle_at]
+            size, text = number(end), text_of(angle)
+            if not isinstance(angle, ast.Phrase) or not is_angle(angle) or size is None or text in bounded:
+                continue
+            if least < size < math.pi:
                 yield make_warning(
-                    "angle-without-abs", f"`{text}` is negative to the right, down to -180 deg: half of what faces the "
-                    "other way is left out", node.span, "bounds one side alone",
-                    f"`abs({text}) > {text_of(end)}` has both sides",
-                )  # fmt: skip
-    for node, angle, end in pairs:
-        most = number(end)
-        if isinstance(angle, ast.Phrase) and is_angle(angle) and most is not None and 0 < most < math.pi:
-            text = text_of(angle)
-            if text not in bounded_below:
-                yield make_warning(
-                    "angle-without-abs", f"`{text}` is negative to the right, so every angle to the right is below "
-                    f"{text_of(end)}", node.span, "bounds one side alone",
-                    f"`abs({text}) < {text_of(end)}` bounds both sides",
+                    "angle-without-abs", f"`{text}` is {why.format(end=text_of(end))}", each[0].span,
+                    "bounds one side alone", f"`abs({text}) {sign} {text_of(end)}` {verb} both sides",
                 )  # fmt: skip
 
 

@@ -11,14 +11,13 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import msgspec
 
 from scenicq.errors import render
-from scenicq.evaluate.comparison import MARGIN
-from scenicq.evaluate.detection import Missing
 from scenicq.evaluate.evaluation import evaluate_models, name_models
+from scenicq.evaluate.evaluation_options import EvaluationTexts
 from scenicq.lint.program import lint_query
 from scenicq.match.matcher import Matcher
 from scenicq.match.verdict import NoMatch
@@ -376,31 +375,14 @@ class Matches(Sequence[FrameResult]):
         results = [each.result for each in self._all()]
         return write_report(self.query, results, any_path(folder), sensors=None if sensors is None else Path(sensors))
 
-    def evaluate(
-        self,
-        predictions: str | Path | Sequence[str | Path],
-        *,
-        distance_m: float | str | Mapping[str, float] = 2.0,
-        least_score: float | None = None,
-        missing: Missing = "error",
-        simulated: str | Path | None = None,
-        cluster: str | None = None,
-        margin: float = MARGIN,
-        seed: int = 0,
-    ) -> Judgement:
+    def evaluate(self, predictions: str | Path | Sequence[str | Path], **options: Unpack[EvaluationTexts]) -> Judgement:
         """Say whether a model fails on the frames that match.
 
         Args:
             predictions: A file of what the model has detected; or those of several models, each of which is also
                 compared with those before it.
-            distance_m: Centre distance within which an object counts as found: 0.5, 1, 2 or 4; for some classes
-                another one, such as "2,pedestrian=0.5" or {"": 2, "pedestrian": 0.5}.
-            least_score: Score from which a prediction counts; all by default.
-            missing: What a frame without predictions is; see `scenicq.evaluate.evaluation.evaluate`.
-            simulated: A CSV file of simulated runs.
-            cluster: The parameter whose values recordings of one cluster share, or `recording`.
-            margin: What is missed more often by less than this share counts as no worse.
-            seed: The same figures come from the same seed.
+            options: As of `scenicq evaluate`, such as `distance_m=1`, `missing="empty"`, `cluster="drive"` or `seed=7`;
+                `scenicq.evaluate.evaluation.evaluate` lists them.
 
         Raises:
             DataError: A file cannot be read or does not fit the dataset; option-invalid for another distance, seed or
@@ -410,9 +392,8 @@ class Matches(Sequence[FrameResult]):
         paths = (predictions,) if isinstance(predictions, str | Path) else tuple(predictions)
         models = name_models([Path(each) for each in paths])
         judged = evaluate_models(
-            {name: self.query}, self.query.dataset, dict(zip(models, paths, strict=True)), distance_m=distance_m,
-            least_score=least_score, missing=missing, simulated=simulated, cluster=cluster, margin=margin, seed=seed,
-        )  # fmt: skip
+            {name: self.query}, self.query.dataset, dict(zip(models, paths, strict=True)), **options
+        )
         return Judgement(judged.only or judged, self.query.dataset)
 
     def __repr__(self) -> str:

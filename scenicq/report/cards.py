@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from scenicq.report.backdrop import Backdrop
 from scenicq.report.frames import badge, frame_facts
@@ -12,7 +13,11 @@ from scenicq.report.picture import Shot, View, draw_shot, ground, plane_of, view
 from scenicq.report.runs import FrameRun
 from scenicq.report.sensors import Sensor
 from scenicq.report.sheet import tile
-from scenicq.report.svg import element, escape
+from scenicq.report.svg import element
+from scenicq.report.templates import markup
+
+if TYPE_CHECKING:
+    from markupsafe import Markup
 
 __all__ = ["TILE_LETTERS", "Card", "best_frame", "draw_card", "draw_tile"]
 
@@ -96,7 +101,7 @@ def best_frame(run: FrameRun, shots: Sequence[Shot]) -> int:
     return min(range(len(run.results)), key=lambda place: (round(far[place], 1), abs(place - middle)))
 
 
-def draw_tile(card: Card, image: str | None = None) -> str:
+def draw_tile(card: Card, image: str | None = None) -> Markup:
     """Draw the best frame of a run as a small picture that links to the run.
 
     Args:
@@ -107,7 +112,7 @@ def draw_tile(card: Card, image: str | None = None) -> str:
     shot, plane = card.shots[best], plane_of(card.shots[0].label)
     told = _told(shot)
     if image is not None:
-        picture = f'<img loading="lazy" width="320" height="320" src="{escape(image)}" alt="{escape(told)}">'
+        picture: str = markup("cards", "image", source=image, told=told)
     else:
         view = view_of(shot.label, shot.roles)
         below = element("use", href=f"#map-{card.number}")
@@ -116,82 +121,24 @@ def draw_tile(card: Card, image: str | None = None) -> str:
     return tile(card.run, card.number, best, picture)
 
 
-def _beside(card: Card, pictures: tuple[str, ...]) -> str:
-    sources = [
-        element("span", class_="shot", data_picture=name, data_told=_told(shot), hidden=True)
-        for name, shot in zip(pictures, card.shots, strict=True)
-    ]
-    told = escape(_told(card.shots[0]))
-    image = f'<img class="picture" loading="lazy" width="900" height="900" src="{escape(pictures[0])}" alt="{told}">'
-    return image + "".join(sources)
-
-
-def _slider(card: Card) -> str:
-    count = len(card.shots)
-    if count == 1:
-        return ""
-    return element(
-        "div",
-        element(
-            "button",
-            "\N{SINGLE LEFT-POINTING ANGLE QUOTATION MARK}",
-            type="button",
-            class_="back",
-            aria_label="Previous frame",
-        ),
-        f'<input type="range" min="1" max="{count}" value="1" aria-label="Frame of run {card.number}">',
-        element(
-            "button",
-            "\N{SINGLE RIGHT-POINTING ANGLE QUOTATION MARK}",
-            type="button",
-            class_="on",
-            aria_label="Next frame",
-        ),
-        element("output", f"1 / {count}"),
-        class_="slider",
-    )
-
-
-def draw_card(card: Card) -> str:
+def draw_card(card: Card) -> Markup:
     """Draw a card, as markup.
 
     Args:
         card: What it is made of.
     """
-    run = card.run
-    count, title = len(card.shots), f"run-{card.number}-title"
+    run, count = card.run, len(card.shots)
     frames = f"frame {run.first}" if count == 1 else f"frames {run.first}\N{EN DASH}{run.first + count - 1}"
-    head = element(
-        "h3",
-        element("span", escape(run.recording), class_="recording"),
-        " ",
-        element("span", f"{frames} of {run.of}", class_="frames"),
-        " ",
-        badge(run.results[0].verdict, "near miss"),
-        id=title,
-    )
-    picture = _inline(card) if card.pictures is None else _beside(card, card.pictures)
+    if card.pictures is None:
+        picture = _inline(card)
+    else:
+        beside = [(name, _told(shot)) for name, shot in zip(card.pictures, card.shots, strict=True)]
+        picture = markup("cards", "beside", pictures=beside)
     facts = [
-        element("div", frame_facts(shot, sensors, card.texts, each.recorded), class_="frame", hidden=number > 0)
-        for number, (shot, sensors, each) in enumerate(zip(card.shots, card.sensors, run.results, strict=True))
+        frame_facts(shot, sensors, card.texts, each.recorded)
+        for shot, sensors, each in zip(card.shots, card.sensors, run.results, strict=True)
     ]
-    body = element(
-        "div",
-        element("div", picture, _slider(card), run.timeline, class_="view-pane"),
-        element("div", *facts),
-        class_="run-body",
-    )
-    return element(
-        "article",
-        head,
-        body,
-        class_="run",
-        id=f"run-{card.number}",
-        tabindex=0,
-        aria_labelledby=title,
-        data_recording=run.recording,
-        data_kind=run.kind,
-        data_time=run.results[0].timestamp_us,
-        data_length=count,
-        data_order=card.number,
-    )
+    return markup(
+        "cards", "card", number=card.number, run=run, frames=frames, badge=badge(run.results[0].verdict, "near miss"),
+        picture=picture, facts=facts, time=run.results[0].timestamp_us,
+    )  # fmt: skip

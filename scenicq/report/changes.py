@@ -6,15 +6,17 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.query.execution.records import CauseRecord, FrameRecord, IntervalRecord, Record
 from scenicq.query.execution.result_files import ReadResults
 from scenicq.query.execution.result_origin import check_origins
-from scenicq.report.frames import table
 from scenicq.report.page import page
-from scenicq.report.svg import element, escape
+from scenicq.report.templates import markup
+
+if TYPE_CHECKING:
+    from markupsafe import Markup
 
 __all__ = ["FrameChange", "changes", "changes_page", "changes_text", "check_complete", "check_datasets"]
 
@@ -205,19 +207,18 @@ def changes_text(found: Sequence[FrameChange], *, every: bool = False) -> str:
     return "\n".join(lines)
 
 
-def _section(kind: Kind, found: Sequence[FrameChange]) -> str:
+def _section(kind: Kind, found: Sequence[FrameChange]) -> Markup:
     """A section of frames with the same fate: why, then which; neighbours that are alike share an item."""
     causes = Counter(_elsewhere(change) for change in found if change.why)
-    told = [(escape(cause), f"{count:,}") for cause, count in causes.most_common()]
-    items: list[str] = []
+    items: list[tuple[str, str, list[str]]] = []
     for (recording, objects, why), group in groupby(found, key=lambda c: (c.recording, _objects(c), _elsewhere(c))):
-        frames = [element("span", escape(change.frame), class_="id") for change in group]
+        frames = [change.frame for change in group]
         number = f"{len(frames):,} {'frame' if len(frames) == 1 else 'frames'}"
-        head = element("b", escape(recording)) + f", {number}: " + escape("; ".join(filter(None, (objects, why))))
-        items.append(element("li", head, element("div", " ".join(frames), class_="hint")))
-    title = element("summary", element("b", f"{_MARKS[kind]} {kind}"), f": {escape(_TOLD[kind])} ({len(found):,})")
-    reasons = table("Why they do not match in the other", ("cause", "frames"), told)
-    return element("details", title, reasons, element("ul", *items), open=kind != "stayed", class_="change")
+        items.append((recording, f", {number}: {'; '.join(filter(None, (objects, why)))}", frames))
+    return markup(
+        "changes", "section", mark=_MARKS[kind], kind=kind, meaning=_TOLD[kind], number=f"{len(found):,}",
+        causes=[(cause, f"{count:,}") for cause, count in causes.most_common()], groups=items,
+    )  # fmt: skip
 
 
 def changes_page(found: Sequence[FrameChange], names: tuple[str, str], doubts: Sequence[Diagnostic] = ()) -> str:
@@ -229,12 +230,10 @@ def changes_page(found: Sequence[FrameChange], names: tuple[str, str], doubts: S
         doubts: What the reader should know of them.
     """
     counts = [(f"{_MARKS[kind]}\N{NO-BREAK SPACE}{kind}", _TOLD[kind], f"{count:,}") for kind, count in _counts(found)]
-    files = [element("p", element("b", side), ": ", escape(name)) for side, name in zip("AB", names, strict=True)]
-    told = [element("li", escape("; ".join((each.message, *each.hints)))) for each in doubts]
-    parts = [element("ul", *told, class_="cause")] if told else []
-    parts += [table("Frames", ("change", "meaning", "frames"), counts)]
-    for kind in _TOLD:
-        group = [change for change in found if change.kind == kind]
-        parts += [_section(kind, group)] if group else []
-    head = element("header", element("h1", "Two results compared"), *files)
-    return page(f"{names[0]} and {names[1]} compared", [head, element("main", *parts)], script=False)
+    of_kind: dict[Kind, list[FrameChange]] = {kind: [each for each in found if each.kind == kind] for kind in _TOLD}
+    body = markup(
+        "changes", "body", names=list(zip("AB", names, strict=True)), counts=counts,
+        doubts=["; ".join((each.message, *each.hints)) for each in doubts],
+        sections=[_section(kind, group) for kind, group in of_kind.items() if group],
+    )  # fmt: skip
+    return page(f"{names[0]} and {names[1]} compared", [body], script=False)

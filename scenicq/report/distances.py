@@ -11,7 +11,7 @@ from typing import cast
 
 import shapely
 
-from scenicq.forest.compute import CannotEvaluate
+from scenicq.errors import CannotEvaluate
 from scenicq.forest.condition import condition
 from scenicq.forest.evaluate import Observation
 from scenicq.forest.nodes import Constant, Distance, Node, Norm, Scale, VectorSum

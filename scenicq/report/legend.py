@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from scenicq.report.svg import element
-
-__all__ = ["legend"]
+__all__ = ["SIGNS"]
 
 _BOX = '<path class="outline" d="M-225 -95h450v190h-450z"></path><path class="nose" d="M0 0h225"></path>'
-_SIGNS = (
+SIGNS = (
     ("an object of the label; the line points to its front", f'<g class="box other">{_BOX}</g>'),
     ("one with a role", f'<g class="box other c1">{_BOX}</g>'),
     ("a person", '<g class="box other person"><circle class="dot" r="70"></circle></g>'),
@@ -25,16 +23,4 @@ _SIGNS = (
     ),
     ("direction of traffic", '<g class="map"><path class="direction" d="M-45 -55L45 0L-45 55"></path></g>'),
 )
-
-
-def legend() -> str:
-    """A list of signs and meanings."""
-    items = (
-        element(
-            "li",
-            element("svg", sign, class_="swatch", viewBox="-260 -140 520 280", aria_hidden="true"),
-            element("span", meaning),
-        )
-        for meaning, sign in _SIGNS
-    )
-    return element("ul", *items, class_="legend", aria_label="Signs in the pictures")
+"""Meaning and sign of each."""

@@ -17,8 +17,8 @@ from typing import cast
 
 import shapely
 
+from scenicq.errors import CannotEvaluate
 from scenicq.forest.bounds import FloatInterval, scalar_bounds, vector_bounds
-from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.condition import condition
 from scenicq.forest.evaluate import Observation, evaluate
 from scenicq.forest.nodes import (

@@ -7,24 +7,28 @@ import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from importlib.metadata import PackageNotFoundError, version
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from scenicq import __version__
 from scenicq.match.tolerance import Tolerance
+from scenicq.option_values import Amount, OptionKind
+from scenicq.query.execution.option_texts import QUERY_OPTIONS
 from scenicq.query.execution.results import Funnel
 from scenicq.query.execution.run import Query
-from scenicq.report.frames import table
 from scenicq.report.shares import Line
-from scenicq.report.svg import element, escape
+from scenicq.report.svg import element
+from scenicq.report.templates import markup
+
+if TYPE_CHECKING:
+    from markupsafe import Markup
 
 __all__ = ["funnel_section", "how_section", "program_section", "versions"]
 
 _PACKAGES = ("duckdb", "numpy", "pyarrow", "shapely", "highspy", "dreal")
 
 
-_NAMES = {"version": "scenic", "every": "all", "timeout_s": "timeout"}
-"""Options that the command line calls otherwise."""
-_UNITS = {"radius": "m", "timeout_s": "s"}
+_OPTIONS = {option.field: (name, option) for name, option in QUERY_OPTIONS.items()}
+"""The options that people write, with their names, by where their values are."""
 
 
 def _bar(share: float, told: str) -> str:
@@ -35,7 +39,7 @@ def _bar(share: float, told: str) -> str:
     )
 
 
-def program_section(lines: Sequence[Line], rest: Mapping[str, int], frames: int) -> str:
+def program_section(lines: Sequence[Line], rest: Mapping[str, int], frames: int) -> Markup:
     """The program as a table.
 
     Args:
@@ -43,44 +47,16 @@ def program_section(lines: Sequence[Line], rest: Mapping[str, int], frames: int)
         rest: Frames excluded by what no line says.
         frames: Frames looked at.
     """
-    rows: list[str] = []
+    rows: list[tuple[Line, str, str]] = []
     for line in lines:
         share = line.excluded / frames if frames else 0.0
         told = f"{line.excluded:,} frames ({share:.1%}) failed first here"
-        cells = element("td", _bar(share, told) if line.excluded else "", class_="share")
-        count = element(
-            "td", f"{share:.1%}" if line.excluded else "", class_="count", title="; ".join(line.what) or None
-        )
-        number = element("th", str(line.number), scope="row")
-        code = element("td", element("code", escape(line.text) or "&#8203;"))
-        rows.append(element("tr", number, count, cells, code, id=f"line-{line.number}"))
-    names = (element("th", "line", scope="col"), element("th", "excluded", scope="col", colspan=2))
-    head = element("tr", *names, element("th", "program", scope="col"))
-    body = element("table", element("thead", head), element("tbody", *rows), class_="program")
-    others = [(escape(what), f"{count:,}", f"{count / frames:.1%}") for what, count in rest.items()]
-    return element(
-        "section",
-        element("h2", "Program", id="program-title"),
-        element("p", "Each frame that does not match is counted at the line that it failed first at.", class_="hint"),
-        element("div", body, class_="scroll"),
-        table("Excluded by what no single line says", ("what", "frames", "share"), others),
-        aria_labelledby="program-title",
-        class_="program-pane",
-    )
+        rows.append((line, f"{share:.1%}", _bar(share, told)) if line.excluded else (line, "", ""))
+    others = [(what, f"{count:,}", f"{count / frames:.1%}") for what, count in rest.items()]
+    return markup("overview", "program_section", lines=rows, rest=others)
 
 
-def _step(name: str, number: int, frames: int | None = None) -> str:
-    """A row of the funnel, with a bar for its share of frames where it counts any."""
-    bar = "" if frames is None else _bar(number / frames if frames else 0.0, f"{number:,} of {frames:,}")
-    return element(
-        "tr",
-        element("th", escape(name), scope="row"),
-        element("td", f"{number:,}", class_="count"),
-        element("td", bar, class_="share"),
-    )
-
-
-def funnel_section(funnel: Funnel, cut: str) -> str:
+def funnel_section(funnel: Funnel, cut: str) -> Markup:
     """How many frames are left after each step.
 
     Args:
@@ -102,8 +78,15 @@ def funnel_section(funnel: Funnel, cut: str) -> str:
     else:
         steps.append(("with an object for every role", funnel.with_roles))
         steps += [("matches", funnel.matches), ("unknown", funnel.unknowns)]
-    rows = [_step(name, number, funnel.frames) for name, number in steps]
-    rows += [_step(name, number) for name, number in counted]
+    rows = [
+        (
+            name,
+            f"{number:,}",
+            _bar(number / funnel.frames if funnel.frames else 0.0, f"{number:,} of {funnel.frames:,}"),
+        )
+        for name, number in steps
+    ]
+    rows += [(name, f"{number:,}", "") for name, number in counted]
     told = [
         "; ".join((f"{each.message}{f' ({each.span.place})' if each.span is not None else ''}", *each.hints))
         for each in funnel.warnings
@@ -112,25 +95,14 @@ def funnel_section(funnel: Funnel, cut: str) -> str:
         f"`{what}` is missing in {count:,} frame{'' if count == 1 else 's'} of the dataset, and not compared there"
         for what, count in sorted(funnel.missing.items())
     ]
-    warnings = [element("li", escape(each)) for each in told]
     failed = [
-        (escape(what), f"{count:,}", f"{count / funnel.frames:.1%}")
+        (what, f"{count:,}", f"{count / funnel.frames:.1%}")
         for what, count in sorted(funnel.excluded.items(), key=lambda item: (-item[1], item[0]))
     ]
     broken = [
-        (escape(what), f"{count:,}")
-        for what, count in sorted(funnel.broken.items(), key=lambda item: (-item[1], item[0]))
+        (what, f"{count:,}") for what, count in sorted(funnel.broken.items(), key=lambda item: (-item[1], item[0]))
     ]
-    return element(
-        "section",
-        element("h2", "Where the frames went", id="funnel-title"),
-        element("p", escape(f"Not complete: {cut}."), class_="hint") if cut else "",
-        element("ul", *warnings, class_="cause") if warnings else "",
-        element("table", element("tbody", *rows), class_="funnel"),
-        table("First failed at", ("what", "frames", "share"), failed),
-        table("Then failed at", ("what", "ways to give the objects tracks"), broken),
-        aria_labelledby="funnel-title",
-    )
+    return markup("overview", "funnel_section", cut=cut, warnings=told, steps=rows, failed=failed, broken=broken)
 
 
 def versions() -> dict[str, str]:
@@ -151,26 +123,27 @@ def _flat(value: Any, name: str = "") -> list[tuple[str, str]]:
             for each in fields(value)
             for row in _flat(getattr(value, each.name), f"{name}.{each.name}" if name else each.name)
         ]
-    name = name.removeprefix("match.")
-    return [(_NAMES.get(name, name.replace("_", "-")), _shown(name, value))]
+    written, option = _OPTIONS.get(name, (name.rpartition(".")[2], None))
+    flag = option.flags[-1].removeprefix("--") if option is not None and option.flags else written.replace("_", "-")
+    return [(flag, _shown(value, option.kind if option is not None else None))]
 
 
-def _shown(name: str, value: Any) -> str:
+def _shown(value: Any, kind: OptionKind | None) -> str:
     """An option's value as a person would give it."""
     match value:
         case None:
             return "not given"
         case bool():
             return "yes" if value else "no"
-        case float() if name in _UNITS:
-            return f"{value:g} {_UNITS[name]}"
+        case float() if isinstance(kind, Amount) and kind.unit:
+            return f"{value:g} {kind.unit}"
         case frozenset():
             return ", ".join(sorted(map(str, cast("frozenset[Any]", value)))) or "none"
         case _:
             return str(value)
 
 
-def how_section(query: Query, command: str, elapsed_s: float) -> str:
+def how_section(query: Query, command: str, elapsed_s: float) -> Markup:
     """The section that says how to make this report again: command line, options, versions, dataset.
 
     Args:
@@ -182,26 +155,7 @@ def how_section(query: Query, command: str, elapsed_s: float) -> str:
     about = [("path", query.dataset.name), ("name", manifest.name), ("importer", manifest.importer)]
     about.append(("dataset.json, SHA-256", hashlib.sha256(manifest.to_json().encode()).hexdigest()))
     about += [("source", manifest.provenance.source), ("time", manifest.provenance.time)]
-    copy = element(
-        "p",
-        element("code", escape(command), id="command"),
-        " ",
-        element("button", "Copy", type="button", id="copy"),
-        element("span", role="status", id="copied"),
-        class_="command",
-    )
-    rows = ((escape(name), escape(value)) for name, value in _flat(query.options))
-    return element(
-        "section",
-        element("h2", "Run it again", id="how-title"),
-        copy if command else "",
-        element("p", f"The query took {elapsed_s:.1f} s.", class_="hint"),
-        element(
-            "div",
-            table("Options", ("option", "value"), list(rows)),
-            table("Versions", ("package", "version"), [(escape(n), escape(v)) for n, v in versions().items()]),
-            table("Dataset", ("what", "value"), [(escape(n), escape(v)) for n, v in about]),
-            class_="columns",
-        ),
-        aria_labelledby="how-title",
-    )
+    return markup(
+        "overview", "how_section", command=command, elapsed_s=f"{elapsed_s:.1f}", options=_flat(query.options),
+        versions=list(versions().items()), about=about,
+    )  # fmt: skip

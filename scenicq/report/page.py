@@ -5,12 +5,15 @@ from __future__ import annotations
 import base64
 import hashlib
 from collections.abc import Sequence
-from importlib import resources
+from typing import TYPE_CHECKING
 
 from scenicq import __version__
-from scenicq.report.legend import legend
+from scenicq.report.legend import SIGNS
 from scenicq.report.picture import stylesheet
-from scenicq.report.svg import element, escape
+from scenicq.report.templates import asset, markup
+
+if TYPE_CHECKING:
+    from markupsafe import Markup
 
 __all__ = ["GENERATOR", "page", "runs_section"]
 
@@ -19,24 +22,20 @@ GENERATOR = "scenicq report"
 _KINDS = (("match", "matches"), ("unknown", "unknown"), ("near", "near misses"))
 
 
-def _asset(name: str) -> str:
-    return resources.files("scenicq.report").joinpath("assets", name).read_text(encoding="utf-8")
-
-
 def _hash(text: str) -> str:
     return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
 
 
-def page(title: str, body: Sequence[str], *, script: bool = True) -> str:
+def page(title: str, body: Sequence[Markup], *, script: bool = True) -> Markup:
     """A page.
 
     Args:
         title: Its title, a plain text.
-        body: Markup, already escaped.
+        body: Its parts.
         script: Whether it needs the report's script.
     """
-    style = f"{stylesheet()}\n{_asset('page.css')}"
-    code = _asset("page.js") if script else ""
+    style = f"{stylesheet()}\n{asset('page.css')}"
+    code = asset("page.js") if script else ""
     policy = "; ".join(
         (
             "default-src 'none'",
@@ -47,51 +46,15 @@ def page(title: str, body: Sequence[str], *, script: bool = True) -> str:
             "form-action 'none'",
         )
     )
-    head = (
-        '<meta charset="utf-8">'
-        f'<meta http-equiv="Content-Security-Policy" content="{escape(policy)}">'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        '<meta name="color-scheme" content="light dark">'
-        f'<meta name="generator" content="{GENERATOR} {escape(__version__)}">'
-        f"{element('title', escape(title))}<style>{style}</style>"
-    )
-    end = f"<script>{code}</script>" if script else ""
-    return f'<!doctype html>\n<html lang="en"><head>{head}</head><body>{"".join(body)}{end}</body></html>\n'
-
-
-def _select(name: str, label: str, options: Sequence[tuple[str, str]]) -> str:
-    return element("label", label, element("select", *(element("option", t, value=v) for v, t in options), id=name))
-
-
-def _toolbar(recordings: Sequence[str], kinds: Sequence[str]) -> str:
-    names = [element("option", "", value=name).removesuffix("</option>") for name in recordings]
-    orders = (("data-order", "dataset order"), ("-data-length", "longest first"), ("data-time", "by time"))
-    verdicts = [("", "all"), *((kind, text) for kind, text in _KINDS if kind in kinds)]
-    return element(
-        "div",
-        element(
-            "label",
-            "Recording ",
-            '<input type="search" id="filter" list="recordings" placeholder="all" autocomplete="off">',
-        ),
-        element("datalist", *names, id="recordings"),
-        _select("kind", "Verdict ", verdicts) if len(verdicts) > 2 else "",
-        _select("sort", "Sort ", orders),
-        element("span", "", id="shown", role="status"),
-        element(
-            "span",
-            "<kbd>j</kbd> <kbd>k</kbd> run, <kbd>\N{LEFTWARDS ARROW}</kbd> <kbd>\N{RIGHTWARDS ARROW}</kbd> frame, "
-            "<kbd>/</kbd> filter",
-            class_="keys",
-        ),
-        class_="toolbar",
-        role="search",
-    )
+    return markup(
+        "page", "page", title=title, body=body, style=style, script=code, policy=policy,
+        generator=f"{GENERATOR} {__version__}",
+    )  # fmt: skip
 
 
 def runs_section(
-    cards: Sequence[str], recordings: Sequence[str], kinds: Sequence[str], note: str, what: str = "run"
-) -> str:
+    cards: Sequence[Markup], recordings: Sequence[str], kinds: Sequence[str], note: str, what: str = "run"
+) -> Markup:
     """The runs, with what filters and sorts them.
 
     Args:
@@ -101,14 +64,7 @@ def runs_section(
         note: What the reader should know, or nothing.
         what: What a card is about: a run, or an interval.
     """
-    empty = element("p", "No frame matches. The funnel says what excluded them.", class_="hint") if not cards else ""
-    return element(
-        "section",
-        element("h2", "Frames", id="runs-title"),
-        element("p", escape(note), class_="hint") if note else "",
-        empty,
-        _toolbar(recordings, kinds) if cards else "",
-        legend() if cards else "",
-        element("div", *cards, id="runs", data_what=what),
-        aria_labelledby="runs-title",
+    verdicts = [("", "all"), *((kind, text) for kind, text in _KINDS if kind in kinds)]
+    return markup(
+        "page", "runs_section", cards=cards, recordings=recordings, verdicts=verdicts, note=note, what=what, signs=SIGNS
     )

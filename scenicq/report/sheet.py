@@ -5,9 +5,14 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from itertools import groupby
+from typing import TYPE_CHECKING
 
 from scenicq.report.runs import FrameRun
-from scenicq.report.svg import element, escape
+from scenicq.report.svg import element
+from scenicq.report.templates import markup
+
+if TYPE_CHECKING:
+    from markupsafe import Markup
 
 __all__ = ["TILES", "sheet_section", "tile", "timelines_section", "to_picture"]
 
@@ -34,7 +39,7 @@ def to_picture(runs: Sequence[FrameRun]) -> frozenset[int]:
     return frozenset(number for _, number in sorted(turns)[:TILES])
 
 
-def tile(run: FrameRun, number: int, best: int, picture: str) -> str:
+def tile(run: FrameRun, number: int, best: int, picture: str) -> Markup:
     """A small picture of a run's best frame, which links to the run.
 
     Args:
@@ -45,14 +50,14 @@ def tile(run: FrameRun, number: int, best: int, picture: str) -> str:
     """
     count = len(run.results)
     where = f"frame {run.first + best}" + (f" of {run.first}\N{EN DASH}{run.first + count - 1}" if count > 1 else "")
-    kind = "" if run.kind == "match" else element("span", _KINDS[run.kind], class_=f"badge {run.kind}")
-    told = element("b", escape(run.recording)) + " " + element("span", where, class_="time") + " " + kind
-    return element("a", picture, element("span", told, class_="told"), class_="tile", href=f"#run-{number}",
-                   data_run=f"run-{number}", data_frame=best + 1)  # fmt: skip
+    return markup(
+        "sheet", "tile", number=number, frame=best + 1, picture=picture, recording=run.recording, where=where,
+        kind=run.kind, words=_KINDS[run.kind],
+    )  # fmt: skip
 
 
-def sheet_section(tiles: Sequence[str], runs: int) -> str:
-    """All small pictures.
+def sheet_section(tiles: Sequence[Markup], runs: int) -> str:
+    """All small pictures; nothing where there are none.
 
     Args:
         tiles: As `tile` gives them.
@@ -63,17 +68,11 @@ def sheet_section(tiles: Sequence[str], runs: int) -> str:
     told = "Each run is shown by the frame in which its objects are nearest to the ego."
     if runs > len(tiles):
         told += f" {runs - len(tiles):,} more runs are below."
-    return element(
-        "section",
-        element("h2", "At a glance", id="sheet-title"),
-        element("p", told, class_="hint"),
-        element("div", *tiles, class_="sheet"),
-        aria_labelledby="sheet-title",
-    )
+    return markup("sheet", "sheet_section", tiles=tiles, told=told)
 
 
 def timelines_section(runs: Sequence[FrameRun], *, over_time: bool = False) -> str:
-    """Where in each recording the runs are.
+    """Where in each recording the runs are; nothing where there are none.
 
     Args:
         runs: All runs.
@@ -85,17 +84,11 @@ def timelines_section(runs: Sequence[FrameRun], *, over_time: bool = False) -> s
         return ""
     rows = [_timeline(name, group, over_time=over_time) for name, group in groups[:_ROWS]]
     left = len(groups) - len(rows)
-    note = element("p", f"{left:,} more recordings are not shown here.", class_="hint") if left > 0 else ""
-    return element(
-        "section",
-        element("h2", "Recordings", id="recordings-title"),
-        element("ul", *rows, class_="recordings"),
-        note,
-        aria_labelledby="recordings-title",
-    )
+    return markup("sheet", "timelines_section", rows=rows, left=f"{left:,}" if left > 0 else "")
 
 
-def _timeline(name: str, runs: Sequence[tuple[int, FrameRun]], *, over_time: bool) -> str:
+def _timeline(name: str, runs: Sequence[tuple[int, FrameRun]], *, over_time: bool) -> tuple[str, str, str]:
+    """The name of a recording, where its runs are, and the same in words."""
     of = runs[0][1].of
     marks: list[str] = []
     for number, run in runs:
@@ -116,5 +109,4 @@ def _timeline(name: str, runs: Sequence[tuple[int, FrameRun]], *, over_time: boo
         said = f"{len(runs):,} {'interval' if len(runs) == 1 else 'intervals'}"
     track = element("rect", class_="track", width=of, height=10)
     strip = element("svg", track, *marks, viewBox=f"0 0 {of} 10", preserveAspectRatio="none", class_="strip")
-    told = f"{said} in {of:,} frame{'' if of == 1 else 's'}"
-    return element("li", element("b", escape(name)), strip, element("span", told, class_="time"))
+    return name, strip, f"{said} in {of:,} frame{'' if of == 1 else 's'}"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import groupby
+from typing import TYPE_CHECKING
 
 from scenicq.query.execution.interval_frames import frames_of, verdict_at
 from scenicq.query.execution.recorded_columns import show_cell
@@ -13,9 +14,15 @@ from scenicq.query.explain.bands import Band, bands_of, conditions_over
 from scenicq.query.explain.interval_explanation import placed
 from scenicq.report.runs import FrameRun
 from scenicq.report.svg import element, escape
+from scenicq.report.templates import markup
+
+if TYPE_CHECKING:
+    pass
 
 __all__ = ["interval_runs"]
 
+_Lane = tuple[str, Sequence[tuple[str, str]], str]
+"""Whose lane it is, what is done with the class of its colour, and the lane."""
 _COLOURS = 8
 """Colours that tell modes apart; more begin anew."""
 _WORDS = ("false", "unknown", "true")
@@ -57,7 +64,7 @@ def _timeline(query: Query, result: Result) -> str:
     return _drawn(bands, [*_lanes(result.timeline or (), times_us)], [*filter(None, curves)])
 
 
-def _lanes(modes: Sequence[ModeRecord], times_us: Sequence[int]) -> Iterator[str]:
+def _lanes(modes: Sequence[ModeRecord], times_us: Sequence[int]) -> Iterator[_Lane]:
     """A lane for each role, monitor and scenario, coloured by what is done, with what that is and when."""
     lanes: dict[tuple[str, str], list[ModeRecord]] = {}
     for each in modes:
@@ -82,20 +89,16 @@ def _lanes(modes: Sequence[ModeRecord], times_us: Sequence[int]) -> Iterator[str
         texts = {place: f"{what} {', '.join(spans)}" for place, (what, *spans) in told.items()}
         strip = element("svg", *strips, class_="strip lane", role="img", viewBox=f"0 0 {len(times_us)} 10",
                         preserveAspectRatio="none", aria_label=f"{of}: {'; '.join(texts.values())}")  # fmt: skip
-        keys = [
-            element("span", escape(text), class_=f"chip c{colours[place]}" if place else "")
-            for place, text in texts.items()
-        ]
-        name = of if kind == "behavior" else f"{kind} {of}"
-        yield element("li", element("div", element("b", escape(name)), *keys, class_="modes"), strip)
+        keys = [(text, f"chip c{colours[place]}" if place else "") for place, text in texts.items()]
+        yield of if kind == "behavior" else f"{kind} {of}", keys, strip
 
 
-def _curve(name: str, values: Sequence[RecordedCell]) -> str:
-    """Numbers over the samples, with gaps where there are none; nothing of what has no numbers."""
+def _curve(name: str, values: Sequence[RecordedCell]) -> tuple[str, str] | None:
+    """Numbers over the samples in words and drawn, with gaps where there are none; None of what has no numbers."""
     numbers = [None if each is None or isinstance(each, str | tuple) else float(each) for each in values]
     known = [each for each in numbers if each is not None]
     if not known:
-        return ""
+        return None
     least, most = min(known), max(known)
     height = (most - least) or 1.0
     points = [
@@ -113,11 +116,11 @@ def _curve(name: str, values: Sequence[RecordedCell]) -> str:
     lines.append(element("line", class_="now", x1=0.5, x2=0.5, y1=0, y2=10))
     strip = element("svg", element("title", escape(told)), *lines, class_="strip curves", role="img",
                     viewBox=f"0 0 {len(values)} 10", preserveAspectRatio="none", aria_label=told)  # fmt: skip
-    return element("li", element("span", escape(told)), strip)
+    return told, strip
 
 
-def _drawn(bands: tuple[Band, ...], lanes: Sequence[str], curves: Sequence[str]) -> str:
-    rows: list[str] = [*lanes]
+def _drawn(bands: tuple[Band, ...], lanes: Sequence[_Lane], curves: Sequence[tuple[str, str]]) -> str:
+    rows: list[tuple[str, bool, str]] = []
     for band in bands:
         count = len(band.values)
         strips = [
@@ -129,10 +132,8 @@ def _drawn(bands: tuple[Band, ...], lanes: Sequence[str], curves: Sequence[str])
         strips.append(element("line", class_="now", x1=0.5, x2=0.5, y1=0, y2=10))
         strip = element("svg", *strips, class_="strip", role="img", viewBox=f"0 0 {count} 10",
                         preserveAspectRatio="none", aria_label=_summary(band.values))  # fmt: skip
-        told = element("b" if band.is_requirement else "span", escape(band.what))
-        rows.append(element("li", told, strip))
-    rows += curves
-    return element("ul", *rows, class_="timeline", aria_label="Timeline") if rows else ""
+        rows.append((band.what, band.is_requirement, strip))
+    return markup("sheet", "timeline", lanes=lanes, bands=rows, curves=curves) if lanes or rows or curves else ""
 
 
 def _pieces(values: tuple[int, ...]) -> Iterator[tuple[int, int, int]]:

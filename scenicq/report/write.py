@@ -8,6 +8,7 @@ import tempfile
 from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from scenicq.errors import DataError, Diagnostic, ScenarioError
 from scenicq.forest.scenario import Scenario
@@ -29,10 +30,13 @@ from scenicq.report.runs import FrameRun, find_runs, frame_numbers
 from scenicq.report.sensors import SensorFiles, can_make_thumbnails, roots_of
 from scenicq.report.shares import program_lines
 from scenicq.report.sheet import sheet_section, timelines_section, to_picture
-from scenicq.report.svg import element, escape
+from scenicq.report.templates import markup
 from scenicq.report.timelines import interval_runs
 from scenicq.store.atomic_files import check_writable, whole_folder
 from scenicq.store.remote_path import AnyPath, RemotePath
+
+if TYPE_CHECKING:
+    from markupsafe import Markup
 
 __all__ = ["INLINE", "MOST", "check_target", "new_report", "write_report"]
 
@@ -200,7 +204,7 @@ class _Report:
         self.worlds: dict[str, _World | None] = {}
         self.files = SensorFiles(roots_of(query.dataset, sensors), folder, work, can_make_thumbnails())
         self.pictured = 0
-        self.tiles: list[str] = []
+        self.tiles: list[Markup] = []
 
     def world(self, name: str) -> _World | None:
         """The scenario over a map, None if it does not fit."""
@@ -212,7 +216,7 @@ class _Report:
                 self.worlds[name] = None
         return self.worlds[name]
 
-    def text(self, results: Sequence[Result], near: Sequence[Result], command: str, elapsed_s: float) -> str:
+    def text(self, results: Sequence[Result], near: Sequence[Result], command: str, elapsed_s: float) -> Markup:
         """The page."""
         funnel, dataset = self.query.funnel, self.query.dataset
         # of a frame that matches in several ways the first is shown, but every interval
@@ -251,25 +255,22 @@ class _Report:
             if over_time
             else f" in {dataset.manifest.name or dataset.name}"
         )
-        head = element("header", element("h1", escape(name)), element("p", escape(told)))
-        overview = element(
-            "div",
-            program_section(lines, rest, funnel.frames),
-            funnel_section(funnel, summarize(self.query, ResultCount()).why_cut),
-            class_="overview",
+        body = markup(
+            "page",
+            "report",
+            name=name,
+            told=told,
+            parts=(sheet_section(self.tiles, len(cards)), timelines_section(runs, over_time=over_time)),
+            overview=(
+                program_section(lines, rest, funnel.frames),
+                funnel_section(funnel, summarize(self.query, ResultCount()).why_cut),
+            ),
+            runs=runs_section(cards, recordings, [run.kind for run in runs], note, "interval" if over_time else "run"),
+            how=how_section(self.query, command, elapsed_s),
         )
-        main = element(
-            "main",
-            sheet_section(self.tiles, len(cards)),
-            timelines_section(runs, over_time=over_time),
-            overview,
-            runs_section(cards, recordings, [run.kind for run in runs], note, "interval" if over_time else "run"),
-            how_section(self.query, command, elapsed_s),
-        )
-        skip = element("a", "Skip to the frames", href="#runs-title", class_="skip")
-        return page(f"{name}: {told}", [skip, head, main])
+        return page(f"{name}: {told}", [body])
 
-    def cards(self, runs: Sequence[FrameRun], *, inline: bool) -> Iterator[str]:
+    def cards(self, runs: Sequence[FrameRun], *, inline: bool) -> Iterator[Markup]:
         """The cards of runs."""
         frames = [result.frame for run in runs for result in run.results]
         labels = {label.frame: label for label in self.query.dataset.labels(frames)} if frames else {}

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import Protocol, Self
 
-from scenicq.smt.formula import Problem
+from scenicq.smt.problem import Problem
 
 __all__ = ["Answer", "NoAnswer", "Sat", "Solver", "SolverSession", "SolverStatus", "Unsat"]
 

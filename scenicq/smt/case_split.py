@@ -6,23 +6,25 @@ A solver that gets lost among the cells of a map, or the directions at a point, 
 from __future__ import annotations
 
 from scenicq.budget import clock
+from scenicq.forest.nodes import LogicOp
 from scenicq.limits import LIMITS
 from scenicq.smt.answer import Answer, NoAnswer, Sat, Solver, Unsat
-from scenicq.smt.formula import Conjunction, Disjunction, Problem, conjunction
+from scenicq.smt.problem import Problem
+from scenicq.smt.terms import conjunction, parts
 
 __all__ = ["cases", "check_by_cases"]
 
 
 def cases(problem: Problem) -> list[Problem]:
     """The problem split by its widest disjunction, so that it has a solution if one of these has; empty without one."""
-    root = problem.constraint
-    parts = root.args if isinstance(root, Conjunction) else (root,)
-    choices = [part for part in parts if isinstance(part, Disjunction) and 1 < len(part.args) <= LIMITS.split_cases]
+    wholes = parts(LogicOp.AND, problem.constraint)
+    choices = {number: parts(LogicOp.OR, whole) for number, whole in enumerate(wholes)}
+    choices = {number: options for number, options in choices.items() if 1 < len(options) <= LIMITS.split_cases}
     if not choices:
         return []
-    chosen = max(choices, key=lambda part: len(part.args))
-    rest = [part for part in parts if part is not chosen]
-    return [Problem(problem.variables, conjunction([*rest, option])) for option in chosen.args]
+    chosen = max(choices, key=lambda number: len(choices[number]))
+    rest = [whole for number, whole in enumerate(wholes) if number != chosen]
+    return [Problem(problem.variables, conjunction([*rest, option])) for option in choices[chosen]]
 
 
 def check_by_cases(solver: Solver, problem: Problem, *, precision: float, timeout_s: float) -> Answer:

@@ -20,8 +20,7 @@ from scenicq.limits import LIMITS
 from scenicq.processes import end_group, ended_after, leashed, limit_memory
 from scenicq.refusals import refused_by_system
 from scenicq.smt.answer import Answer, NoAnswer, Sat
-from scenicq.smt.evaluation import holds
-from scenicq.smt.formula import Problem
+from scenicq.smt.problem import Problem, holds
 from scenicq.smt.smtlib import read_reply, to_smtlib
 
 __all__ = ["SmtlibSolver"]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-import functools
 import importlib
 import math
 import operator
@@ -12,26 +11,24 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from scenicq.forest.nodes import (
+    Arithmetic,
+    ArithmeticOp,
+    Compare,
+    CompareOp,
+    Constant,
+    Identity,
+    Logic,
+    LogicOp,
+    Node,
+    Range,
+)  # fmt: skip
+from scenicq.forest.walk import children, postorder
 from scenicq.limits import LIMITS
 from scenicq.smt.answer import Answer, NoAnswer, Sat, Unsat
-from scenicq.smt.evaluation import holds
-from scenicq.smt.formula import (
-    Conjunction,
-    Disjunction,
-    Formula,
-    Node,
-    Num,
-    Op,
-    Operator,
-    Problem,
-    Relation,
-    TermComparison,
-    Var,
-    compare,
-    conjunction,
-    postorder,
-)
 from scenicq.smt.inverse_elimination import without_inverses
+from scenicq.smt.problem import Formula, Problem, holds
+from scenicq.smt.terms import compare, conjunction, disjunction, parts
 
 __all__ = ["VERSION", "check"]
 
@@ -88,7 +85,7 @@ def check(problem: Problem, *, precision: float, timeout_s: float) -> Answer:
     """
     deadline = time.thread_time() + timeout_s
     related = without_inverses(problem)
-    variables = {variable.name: dreal.Variable(variable.name) for variable in related.variables}
+    variables = {variable.leaf.identity: dreal.Variable(variable.name) for variable in related.variables}
     fixed, choices = _cases(related.constraint)
     try:
         common = _all([_formula(part, variables, precision) for part in fixed])
@@ -116,7 +113,7 @@ def check(problem: Problem, *, precision: float, timeout_s: float) -> Answer:
             box = dreal.CheckSatisfiability(_all([bounds, common, *chosen]), delta)
             if box is None:
                 break
-            witness = {variable.name: _value(box, variables[variable.name]) for variable in problem.variables}
+            witness = {each.name: _value(box, variables[each.leaf.identity]) for each in problem.variables}
             if holds(problem, witness, precision):
                 return Sat(witness)
             doubtful = Sat(witness)
@@ -125,16 +122,15 @@ def check(problem: Problem, *, precision: float, timeout_s: float) -> Answer:
 
 def _cases(constraint: Formula) -> tuple[list[Formula], list[tuple[Formula, ...]]]:
     """The parts of a conjunction that stay, and the alternatives that are tried one by one."""
-    parts = constraint.args if isinstance(constraint, Conjunction) else (constraint,)
-    fixed: list[Formula] = [part for part in parts if not isinstance(part, Disjunction)]
+    fixed: list[Formula] = []
     choices: list[tuple[Formula, ...]] = []
     count = 1
-    for part in sorted((part for part in parts if isinstance(part, Disjunction)), key=lambda part: len(part.args)):
-        count *= max(1, len(part.args))
-        if count <= LIMITS.dreal_conjunctions:
-            choices.append(part.args)
+    for alternatives in sorted((parts(LogicOp.OR, part) for part in parts(LogicOp.AND, constraint)), key=len):
+        count *= len(alternatives)
+        if len(alternatives) > 1 and count <= LIMITS.dreal_conjunctions:
+            choices.append(alternatives)
         else:
-            fixed.append(part)
+            fixed.append(disjunction(alternatives))
     return fixed, choices
 
 
@@ -145,9 +141,9 @@ def _bounds(problem: Problem, reach: float) -> Formula:
         low = variable.low if math.isfinite(variable.low) else min(-reach, variable.high - reach)
         high = variable.high if math.isfinite(variable.high) else max(reach, variable.low + reach)
         if math.isfinite(low):
-            atoms.append(compare("<=", low, Var(variable.name)))
+            atoms.append(compare("<=", low, variable.leaf))
         if math.isfinite(high):
-            atoms.append(compare("<=", Var(variable.name), high))
+            atoms.append(compare("<=", variable.leaf, high))
     return conjunction(atoms)
 
 
@@ -160,63 +156,59 @@ def _value(box: Symbolic, variable: Symbolic) -> float:
     return float(box[variable].mid()) if box.has_key(variable) else 0.0
 
 
-def _formula(root: Node, variables: dict[str, Symbolic], precision: float) -> Symbolic:
+def _formula(root: Formula, variables: dict[Identity, Symbolic], precision: float) -> Symbolic:
     made: dict[int, Symbolic] = {}
-    for node in postorder(root):
-        match node:
-            case Var(name):
-                made[id(node)] = dreal.Expression(variables[name])
-            case Num(value):
-                made[id(node)] = dreal.Expression(float(value))
-            case Op(function, args):
-                made[id(node)] = _operation(function, [made[id(arg)] for arg in args])
-            case TermComparison(_, Num(left), Num(right)):
-                # only atoms that rounding decides are ground
-                close = abs(left - right) <= precision
-                made[id(node)] = dreal.Formula.TRUE() if close else dreal.Formula.FALSE()
-            case TermComparison(relation, left, right):
-                made[id(node)] = _RELATIONS[relation](made[id(left)], made[id(right)])
-            case Disjunction(args):
-                made[id(node)] = dreal.logical_or(dreal.Formula.FALSE(), *(made[id(arg)] for arg in args))
-            case _:
-                made[id(node)] = _all([made[id(arg)] for arg in node.args])
+    for node in postorder((root,)):
+        made[id(node)] = _translated(node, [made[id(child)] for child in children(node)], variables, precision)
     return made[id(root)]
 
 
-def _operation(function: Operator, args: list[Symbolic]) -> Symbolic:
-    if function in _FOLDS:
-        return functools.reduce(_FOLDS[function], args)
-    return _FUNCTIONS[function](*args)
+def _translated(node: Node, args: list[Symbolic], variables: dict[Identity, Symbolic], precision: float) -> Symbolic:
+    match node:
+        case Range():
+            return dreal.Expression(variables[node.identity])
+        case Constant(value=bool() as value):
+            return dreal.Formula.TRUE() if value else dreal.Formula.FALSE()
+        case Constant(value=float() as value):
+            return dreal.Expression(value)
+        case Arithmetic():
+            return _FUNCTIONS[node.op](*args)
+        case Compare(_, Constant(value=float() as left), Constant(value=float() as right)):
+            # only comparisons that rounding decides are of numbers
+            return dreal.Formula.TRUE() if abs(left - right) <= precision else dreal.Formula.FALSE()
+        case Compare():
+            return _RELATIONS[node.op](*args)
+        case Logic(op=LogicOp.OR):
+            return dreal.logical_or(dreal.Formula.FALSE(), *args)
+        case _:
+            return _all(args)
 
 
 def _quotient(a: Symbolic, b: Symbolic) -> Symbolic:
     return a / b
 
 
-_RELATIONS: dict[Relation, Callable[[Symbolic, Symbolic], Symbolic]] = {
-    Relation.LE: operator.le,
-    Relation.LT: operator.lt,
-    Relation.EQ: operator.eq,
+_RELATIONS: dict[CompareOp, Callable[[Symbolic, Symbolic], Symbolic]] = {
+    CompareOp.LE: operator.le,
+    CompareOp.LT: operator.lt,
+    CompareOp.EQ: operator.eq,
 }
 
-_FOLDS: dict[Operator, Callable[[Symbolic, Symbolic], Symbolic]] = {
-    Operator.ADD: operator.add,
-    Operator.MUL: operator.mul,
-    Operator.MIN: dreal.Min,
-    Operator.MAX: dreal.Max,
-}
-
-_FUNCTIONS: dict[Operator, Callable[..., Symbolic]] = {
-    Operator.SUB: operator.sub,
-    Operator.DIV: _quotient,
-    Operator.NEG: operator.neg,
-    Operator.ABS: abs,
-    Operator.SQRT: dreal.sqrt,
-    Operator.SIN: dreal.sin,
-    Operator.COS: dreal.cos,
-    Operator.TAN: dreal.tan,
-    Operator.ATAN: dreal.atan,
-    Operator.POW: dreal.pow,
-    Operator.EXP: dreal.exp,
-    Operator.LOG: dreal.log,
+_FUNCTIONS: dict[ArithmeticOp, Callable[..., Symbolic]] = {
+    ArithmeticOp.ADD: operator.add,
+    ArithmeticOp.SUB: operator.sub,
+    ArithmeticOp.MUL: operator.mul,
+    ArithmeticOp.DIV: _quotient,
+    ArithmeticOp.NEG: operator.neg,
+    ArithmeticOp.ABS: abs,
+    ArithmeticOp.MIN: dreal.Min,
+    ArithmeticOp.MAX: dreal.Max,
+    ArithmeticOp.SQRT: dreal.sqrt,
+    ArithmeticOp.SIN: dreal.sin,
+    ArithmeticOp.COS: dreal.cos,
+    ArithmeticOp.TAN: dreal.tan,
+    ArithmeticOp.ATAN: dreal.atan,
+    ArithmeticOp.POW: dreal.pow,
+    ArithmeticOp.EXP: dreal.exp,
+    ArithmeticOp.LOG: dreal.log,
 }

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import math
 
+from scenicq.errors import CannotEvaluate
 from scenicq.forest.bounds import Box
+from scenicq.forest.nodes import ArithmeticOp
 from scenicq.geometry import shapes
 from scenicq.geometry.cells import convex_parts
 from scenicq.geometry.membership import bounds as region_bounds
@@ -17,8 +19,9 @@ from scenicq.geometry.shapes import Shape
 from scenicq.geometry.terms import overlap, rectangle_shape
 from scenicq.limits import LIMITS
 from scenicq.smt.distance_terms import BoxTerms, dot, minus
-from scenicq.smt.formula import FALSE, TRUE, Formula, Num, Operator, apply, compare, conjunction, disjunction
-from scenicq.smt.region_membership import UnsupportedError, convex_cell, disc
+from scenicq.smt.problem import Formula
+from scenicq.smt.region_membership import convex_cell, disc
+from scenicq.smt.terms import FALSE, TRUE, apply, compare, conjunction, disjunction, number
 
 __all__ = ["box_holds"]
 
@@ -32,7 +35,7 @@ def box_holds(box: BoxTerms, region: Region, around: Box) -> Formula:
         around: Where the box's corners can be; the region's border elsewhere is left out.
 
     Raises:
-        UnsupportedError: The region is of another kind, or its border has too many edges there.
+        CannotEvaluate: The region is of another kind, or its border has too many edges there.
     """
     match region:
         case Everywhere():
@@ -40,7 +43,7 @@ def box_holds(box: BoxTerms, region: Region, around: Box) -> Formula:
         case Nowhere():
             return FALSE
         case Disc():
-            center = (Num(region.center[0]), Num(region.center[1]))
+            center = (number(region.center[0]), number(region.center[1]))
             return conjunction(disc(*minus(corner, center), region.radius) for corner in box.corners())
         case Rectangle():
             return _area_holds(box, rectangle_shape(region), around)
@@ -53,7 +56,7 @@ def box_holds(box: BoxTerms, region: Region, around: Box) -> Formula:
         case IntersectionOf():
             return conjunction(box_holds(box, part, around) for part in region.parts)
         case _:
-            raise UnsupportedError(f"whether a random box lies in a {type(region).__name__}")
+            raise CannotEvaluate(f"whether a random box lies in a {type(region).__name__}")
 
 
 def _near(regions: list[PolygonSet], around: Box) -> Shape:
@@ -79,7 +82,7 @@ def _area_holds(box: BoxTerms, area: Shape, around: Box) -> Formula:
         if min(ax, bx) <= x1 and max(ax, bx) >= x0 and min(ay, by) <= y1 and max(ay, by) >= y0
     ]
     if len(close) > LIMITS.enclosing_edges:
-        raise UnsupportedError("whether a random box lies in a region of so many edges")
+        raise CannotEvaluate("whether a random box lies in a region of so many edges")
     inside = disjunction(convex_cell(box.center, cell) for cell in cells)
     return conjunction([inside, *(_missed(box, *edge) for edge in close)])
 
@@ -89,12 +92,12 @@ def _missed(box: BoxTerms, ax: float, ay: float, bx: float, by: float) -> Formul
     length = math.hypot(bx - ax, by - ay)
     if length == 0.0:
         return TRUE
-    ends = [minus((Num(x), Num(y)), box.center) for x, y in ((ax, ay), (bx, by))]
+    ends = [minus((number(x), number(y)), box.center) for x, y in ((ax, ay), (bx, by))]
     sides: list[Formula] = []
     for axis, half in ((box.right, box.half_width), (box.ahead, box.half_length)):
         places = [dot(end, axis) for end in ends]
-        sides.append(compare(">=", apply(Operator.MIN, *places), half))
-        sides.append(compare("<=", apply(Operator.MAX, *places), apply(Operator.NEG, half)))
-    across = (Num((by - ay) / length), Num((ax - bx) / length))
-    sides.append(compare(">=", apply(Operator.ABS, dot(ends[0], across)), box.extent(across)))
+        sides.append(compare(">=", apply(ArithmeticOp.MIN, *places), half))
+        sides.append(compare("<=", apply(ArithmeticOp.MAX, *places), apply(ArithmeticOp.NEG, half)))
+    across = (number((by - ay) / length), number((ax - bx) / length))
+    sides.append(compare(">=", apply(ArithmeticOp.ABS, dot(ends[0], across)), box.extent(across)))
     return disjunction(sides)

@@ -13,24 +13,16 @@ from typing import Literal, cast
 
 from scenicq.forest.bounds import Box, leaf_boxes, scalar_bounds
 from scenicq.forest.nodes import (
+    ArithmeticOp,
     Identity,
     Node,
     Undefined,
     Value,
 )
 from scenicq.smt.expressions import Expressions
-from scenicq.smt.formula import (
-    FALSE,
-    Formula,
-    Operator,
-    Problem,
-    Term,
-    apply,
-    compare,
-    conjunction,
-    disjunction,
-)
-from scenicq.smt.region_membership import TermVector, UnsupportedError, disc
+from scenicq.smt.problem import Formula, Problem, Term, Variable, is_term
+from scenicq.smt.region_membership import TermVector, disc
+from scenicq.smt.terms import FALSE, apply, compare, conjunction, disjunction
 from scenicq.smt.unknowns import Unknowns
 from scenicq.smt.value_codes import (
     between,
@@ -38,7 +30,7 @@ from scenicq.smt.value_codes import (
     truth,
 )
 
-__all__ = ["Encoding", "Item", "Target", "UnsupportedError", "encode"]
+__all__ = ["Encoding", "Item", "Target", "encode"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,19 +56,19 @@ class Encoding:
 
     Attributes:
         problem: The problem.
-        names: The names of the variables of each random variable: one, or two for a point.
+        made: The variables of each random variable: one, or two for a point.
         whole: The random variables that are whole numbers.
     """
 
     problem: Problem
-    names: Mapping[Identity, tuple[str, ...]]
+    made: Mapping[Identity, tuple[Variable, ...]]
     whole: frozenset[Identity] = frozenset()
 
     def values(self, witness: Mapping[str, float]) -> dict[Identity, Value]:
         """The values of the random variables in a witness."""
         found: dict[Identity, Value] = {}
-        for identity, names in self.names.items():
-            numbers = [float(witness[name]) for name in names]
+        for identity, variables in self.made.items():
+            numbers = [float(witness[variable.name]) for variable in variables]
             if identity in self.whole:
                 numbers = [float(round(number)) for number in numbers]
             found[identity] = (numbers[0], numbers[1]) if len(numbers) == 2 else numbers[0]
@@ -93,12 +85,12 @@ def encode(groups: Sequence[Sequence[Item]], *, borders: bool = True) -> Encodin
             is smaller and has more solutions: if it has none, there is none, but a solution may be none.
 
     Raises:
-        UnsupportedError: A construct has no formula.
+        CannotEvaluate: A construct has no formula.
     """
     unknowns = Unknowns()
     parts = [_group(items, unknowns, borders=borders) for items in groups]
     constraint = conjunction([*parts, *unknowns.side])
-    return Encoding(Problem(tuple(unknowns.variables), constraint), unknowns.names, frozenset(unknowns.whole))
+    return Encoding(Problem(tuple(unknowns.variables), constraint), unknowns.made, frozenset(unknowns.whole))
 
 
 def _group(items: Sequence[Item], unknowns: Unknowns, *, borders: bool) -> Formula:
@@ -123,15 +115,15 @@ def _item(item: Item, expressions: Expressions, boxes: Mapping[Identity, Box]) -
         return truth(code)
     if isinstance(observed, tuple):
         x, y = cast(TermVector, code)
-        dx, dy = apply(Operator.SUB, x, observed[0]), apply(Operator.SUB, y, observed[1])
+        dx, dy = apply(ArithmeticOp.SUB, x, observed[0]), apply(ArithmeticOp.SUB, y, observed[1])
         if target.shape == "box":
             return conjunction([*between(dx, -target.a, target.a), *between(dy, -target.b, target.b)])
         return disc(dx, dy, target.a)
     if not isinstance(observed, float):
         return same(code, observed)
-    if not isinstance(code, Term):
+    if not is_term(code):
         return FALSE
-    off = apply(Operator.SUB, code, observed)
+    off = apply(ArithmeticOp.SUB, code, observed)
     if target.shape == "angle":
         return _near_angle(off, scalar_bounds(node, boxes), observed, target.a)
     return conjunction(between(off, -target.a, target.a))
@@ -144,6 +136,8 @@ def _near_angle(off: Term, limits: tuple[float, float], observed: float, width: 
         turns = range(math.ceil((low - width) / math.tau), math.floor((high + width) / math.tau) + 1)
         return disjunction(conjunction(between(off, math.tau * k - width, math.tau * k + width)) for k in turns)
     if width >= math.pi / 2:
-        return compare(">=", apply(Operator.COS, off), math.cos(min(width, math.pi)))
-    sine = apply(Operator.SIN, off)
-    return conjunction([*between(sine, -math.sin(width), math.sin(width)), compare(">", apply(Operator.COS, off), 0.0)])
+        return compare(">=", apply(ArithmeticOp.COS, off), math.cos(min(width, math.pi)))
+    sine = apply(ArithmeticOp.SIN, off)
+    return conjunction(
+        [*between(sine, -math.sin(width), math.sin(width)), compare(">", apply(ArithmeticOp.COS, off), 0.0)]
+    )

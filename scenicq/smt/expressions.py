@@ -10,6 +10,7 @@ import math
 from collections.abc import Mapping
 from typing import cast
 
+from scenicq.errors import CannotEvaluate
 from scenicq.forest.bounds import Box, scalar_bounds, vector_bounds
 from scenicq.forest.nodes import (
     AheadInLanes,
@@ -61,20 +62,9 @@ from scenicq.limits import LIMITS
 from scenicq.smt.distance_terms import BoxTerms, box_meets, boxes_meet, disc_meets, distance_term, length, minus
 from scenicq.smt.enclosing import box_holds
 from scenicq.smt.field import field_cells
-from scenicq.smt.formula import (
-    FALSE,
-    Formula,
-    Num,
-    Operator,
-    Term,
-    Var,
-    apply,
-    compare,
-    conjunction,
-    disjunction,
-    negation,
-)
-from scenicq.smt.region_membership import TermVector, UnsupportedError, inside_region, picked
+from scenicq.smt.problem import Formula, Term, is_formula, is_term
+from scenicq.smt.region_membership import TermVector, inside_region, picked
+from scenicq.smt.terms import FALSE, apply, compare, conjunction, disjunction, negation, number
 from scenicq.smt.unknowns import Unknowns
 from scenicq.smt.value_codes import (
     CodeChoice,
@@ -90,28 +80,10 @@ from scenicq.smt.value_codes import (
 
 __all__ = ["Expressions"]
 
-_SCALAR: dict[ArithmeticOp, Operator] = {
-    ArithmeticOp.ADD: Operator.ADD,
-    ArithmeticOp.SUB: Operator.SUB,
-    ArithmeticOp.MUL: Operator.MUL,
-    ArithmeticOp.DIV: Operator.DIV,
-    ArithmeticOp.NEG: Operator.NEG,
-    ArithmeticOp.ABS: Operator.ABS,
-    ArithmeticOp.MIN: Operator.MIN,
-    ArithmeticOp.MAX: Operator.MAX,
-    ArithmeticOp.SQRT: Operator.SQRT,
-    ArithmeticOp.SIN: Operator.SIN,
-    ArithmeticOp.COS: Operator.COS,
-    ArithmeticOp.TAN: Operator.TAN,
-    ArithmeticOp.ASIN: Operator.ASIN,
-    ArithmeticOp.ACOS: Operator.ACOS,
-    ArithmeticOp.ATAN: Operator.ATAN,
-    ArithmeticOp.ATAN2: Operator.ATAN2,
-    ArithmeticOp.EXP: Operator.EXP,
-    ArithmeticOp.LOG: Operator.LOG,
-}
-
-
+_AS_IT_IS = frozenset(ArithmeticOp) - {
+    ArithmeticOp.POW, ArithmeticOp.WRAP, ArithmeticOp.FLOOR, ArithmeticOp.CEIL, ArithmeticOp.FLOORDIV, ArithmeticOp.MOD,
+}  # fmt: skip
+"""Operations that solvers have."""
 EVERYWHERE: Box = ((-math.inf, math.inf), (-math.inf, math.inf))
 
 
@@ -130,7 +102,7 @@ class Expressions:
         """The code of a node.
 
         Raises:
-            UnsupportedError: A construct has no formula.
+            CannotEvaluate: A construct has no formula.
         """
         self._keep.append(root)
         for node in postorder((root,)):
@@ -147,7 +119,7 @@ class Expressions:
             case Constant():
                 return constant_code(node.value)
             case Feature():
-                raise UnsupportedError("a feature that was not conditioned")
+                raise CannotEvaluate("a feature that was not conditioned")
             case Range() | Normal() | TruncatedNormal() | DiscreteRange() | Index():
                 return self.unknowns.number(node, terms)
             case PointIn():
@@ -162,24 +134,25 @@ class Expressions:
                 return (terms[0], terms[1])
             case VectorSum():
                 (a, b), (c, d) = cast("list[TermVector]", args)
-                return (apply(Operator.ADD, a, c), apply(Operator.ADD, b, d))
+                return (apply(ArithmeticOp.ADD, a, c), apply(ArithmeticOp.ADD, b, d))
             case Scale():
                 x, y = cast(TermVector, args[0])
-                return (apply(Operator.MUL, x, terms[1]), apply(Operator.MUL, y, terms[1]))
+                return (apply(ArithmeticOp.MUL, x, terms[1]), apply(ArithmeticOp.MUL, y, terms[1]))
             case Rotate():
                 return rotated(cast(TermVector, args[0]), terms[1])
             case Norm():
                 x, y = cast(TermVector, args[0])
                 return apply(
-                    Operator.SQRT, apply(Operator.ADD, apply(Operator.POW, x, 2.0), apply(Operator.POW, y, 2.0))
+                    ArithmeticOp.SQRT,
+                    apply(ArithmeticOp.ADD, apply(ArithmeticOp.POW, x, 2.0), apply(ArithmeticOp.POW, y, 2.0)),
                 )
             case Bearing():
                 x, y = cast(TermVector, args[0])
-                return apply(Operator.ATAN2, apply(Operator.NEG, x), y)
+                return apply(ArithmeticOp.ATAN2, apply(ArithmeticOp.NEG, x), y)
             case CourseCoordinate() | Measure() | LaneCourse() | Corridor() | AheadInLanes():
-                raise UnsupportedError("a course that hangs on what no label shows")
+                raise CannotEvaluate("a course that hangs on what no label shows")
             case Among():
-                raise UnsupportedError("a condition on other label objects that hangs on what no label shows")
+                raise CannotEvaluate("a condition on other label objects that hangs on what no label shows")
             case DirectionAt():
                 return self._direction(node, cast(TermVector, args[1]))
             case Compare():
@@ -215,26 +188,27 @@ class Expressions:
                 return EVERYWHERE
 
     def _point(self, node: PointIn) -> TermVector:
-        if node.identity in self.unknowns.names:
-            x, y = self.unknowns.names[node.identity]
-            return (Var(x), Var(y))
+        if node.identity in self.unknowns.made:
+            x, y = self.unknowns.made[node.identity]
+            return (x.leaf, y.leaf)
         (x0, x1), (y0, y1) = around = self._around(node)
         if x0 > x1 or y0 > y1:
             self.unknowns.side.append(FALSE)
             (x0, x1), (y0, y1) = around = ((0.0, 0.0), (0.0, 0.0))
-        point = (self.unknowns.fresh("x", x0, x1), self.unknowns.fresh("y", y0, y1))
-        self.unknowns.names[node.identity] = (point[0].name, point[1].name)
+        made = self.unknowns.add("x", x0, x1), self.unknowns.add("y", y0, y1)
+        self.unknowns.made[node.identity] = made
+        point = made[0].leaf, made[1].leaf
         self.unknowns.side.append(inside_region(node.region, point, around, self.code))
         return point
 
     def _select(self, node: Select, args: list[object]) -> object:
         index, options = args[0], args[1:]
-        if not isinstance(index, Term | Formula):
+        if not (is_term(index) or is_formula(index)):
             return index
         defined = [option for option in options if not isinstance(option, Undefined)]
         if not defined:
             return options[0]
-        if all(isinstance(option, Term) for option in defined):
+        if all(is_term(option) for option in defined):
             chosen = self.unknowns.fresh("pick")
             self.unknowns.side.append(cases(index, [equal(chosen, option) for option in options]))
             return chosen
@@ -250,8 +224,8 @@ class Expressions:
             ]
             self.unknowns.side.append(cases(index, both))
             return pair
-        if all(isinstance(option, Formula) for option in defined):
-            return cases(index, [option if isinstance(option, Formula) else FALSE for option in options])
+        if all(is_formula(option) for option in defined):
+            return cases(index, [option if is_formula(option) else FALSE for option in options])
         return CodeChoice(tuple((picked(index, n), option) for n, option in enumerate(options)))
 
     def _distance(self, node: Distance, point: TermVector) -> Term:
@@ -272,7 +246,7 @@ class Expressions:
         if len(boxes) == 2:
             return boxes_meet(self._frame(boxes[0]), self._frame(boxes[1]))
         if not boxes:
-            raise UnsupportedError("whether two random regions meet")
+            raise CannotEvaluate("whether two random regions meet")
         other = node.right if boxes[0] is node.left else node.left
         return box_meets(self._frame(boxes[0]), known_region(other))
 
@@ -285,7 +259,7 @@ class Expressions:
             size = cast(Term, self.code(other.radius))
             other_center = cast(TermVector, self.code(other.center))
             away = length(minus(center, other_center))
-            sizes = compare(">=", size, 0.0), compare("<=", away, apply(Operator.ADD, radius, size))
+            sizes = compare(">=", size, 0.0), compare("<=", away, apply(ArithmeticOp.ADD, radius, size))
             return conjunction([reach, *sizes])
         return conjunction([reach, compare("<=", self._distance(Distance(other, disc.center), center), radius)])
 
@@ -298,27 +272,30 @@ class Expressions:
                 return BoxTerms.of(center, *sizes)
             case Constant(value=Rectangle() as box):
                 return BoxTerms.of(
-                    (Num(box.center[0]), Num(box.center[1])), Num(box.heading), Num(box.width), Num(box.length)
+                    (number(box.center[0]), number(box.center[1])),
+                    number(box.heading),
+                    number(box.width),
+                    number(box.length),
                 )
             case _:
-                raise UnsupportedError("whether a random region lies in another")
+                raise CannotEvaluate("whether a random region lies in another")
 
     def _arithmetic(self, node: Arithmetic, args: list[Term]) -> Term:
         op = node.op
-        if op in _SCALAR:
-            return apply(_SCALAR[op], *args)
-        if op is ArithmeticOp.POW and isinstance(args[1], Num):
-            exponent = args[1].value
+        if op in _AS_IT_IS:
+            return apply(op, *args)
+        if op is ArithmeticOp.POW and isinstance(args[1], Constant):
+            exponent = cast(float, args[1].value)
             if exponent == 0.5:
-                return apply(Operator.SQRT, args[0])
+                return apply(ArithmeticOp.SQRT, args[0])
             if exponent == int(exponent):
-                return apply(Operator.POW, args[0], exponent)
+                return apply(ArithmeticOp.POW, args[0], exponent)
         if op is ArithmeticOp.WRAP:
             return self._wrapped(args[0], scalar_bounds(node.args[0], self._boxes))
         whole = self._floored(node, args)
         if whole is not None:
             return whole
-        raise UnsupportedError(f"`{op.value}` of random values")
+        raise CannotEvaluate(f"`{op.value}` of random values")
 
     def _floored(self, node: Arithmetic, args: list[Term]) -> Term | None:
         """Rounding down or up, division and remainder by it: one case for each whole number within the bounds."""
@@ -327,9 +304,9 @@ class Expressions:
             case ArithmeticOp.FLOOR:
                 value, (low, high) = args[0], limits[0]
             case ArithmeticOp.CEIL:
-                value, (low, high) = apply(Operator.NEG, args[0]), (-limits[0][1], -limits[0][0])
+                value, (low, high) = apply(ArithmeticOp.NEG, args[0]), (-limits[0][1], -limits[0][0])
             case ArithmeticOp.FLOORDIV | ArithmeticOp.MOD if limits[1][0] > 0 or limits[1][1] < 0:
-                value = apply(Operator.DIV, args[0], args[1])
+                value = apply(ArithmeticOp.DIV, args[0], args[1])
                 ends = [a / b for a in limits[0] for b in limits[1]]
                 low, high = min(ends), max(ends)
             case _:
@@ -347,18 +324,20 @@ class Expressions:
             )
         )
         if node.op is ArithmeticOp.CEIL:
-            return apply(Operator.NEG, whole)
+            return apply(ArithmeticOp.NEG, whole)
         if node.op is not ArithmeticOp.MOD:
             return whole
-        return apply(Operator.SUB, args[0], apply(Operator.MUL, args[1], whole))
+        return apply(ArithmeticOp.SUB, args[0], apply(ArithmeticOp.MUL, args[1], whole))
 
     def _wrapped(self, angle: Term, limits: tuple[float, float]) -> Term:
         low, high = limits
         if not (math.isfinite(low) and math.isfinite(high)):
-            return apply(Operator.ATAN2, apply(Operator.SIN, angle), apply(Operator.COS, angle))
+            return apply(ArithmeticOp.ATAN2, apply(ArithmeticOp.SIN, angle), apply(ArithmeticOp.COS, angle))
         turns = range(math.ceil((low - math.pi) / math.tau), math.floor((high + math.pi) / math.tau) + 1)
         result = self.unknowns.fresh("angle", -math.pi, math.pi)
-        self.unknowns.side.append(disjunction(equal(result, apply(Operator.SUB, angle, math.tau * k)) for k in turns))
+        self.unknowns.side.append(
+            disjunction(equal(result, apply(ArithmeticOp.SUB, angle, math.tau * k)) for k in turns)
+        )
         return result
 
     def _direction(self, node: DirectionAt, point: TermVector) -> Term:
@@ -373,10 +352,10 @@ class Expressions:
             )
             return cast(Term, self.code(Select(node.field.index, options, span=node.span)))
         if not isinstance(node.field, Constant):
-            raise UnsupportedError("a random vector field at a random point")
+            raise CannotEvaluate("a random vector field at a random point")
         (x0, x1), (y0, y1) = self._around(node.point)
         if not all(map(math.isfinite, (x0, x1, y0, y1))):
-            raise UnsupportedError("the direction of a field at an unbounded point")
+            raise CannotEvaluate("the direction of a field at an unbounded point")
         heading = self.unknowns.fresh("heading", -math.pi, math.pi)
         cells = field_cells(cast(VectorField, node.field.value), point, (x0, y0, x1, y1), borders=self._borders)
         self.unknowns.side.append(

@@ -7,14 +7,16 @@ from typing import assert_never
 import numpy as np
 from numpy.typing import NDArray
 
+from scenicq.forest.nodes import ArithmeticOp
 from scenicq.geometry.cell_guards import Guard, Nearer, Off, Segments, Within
 from scenicq.geometry.cells import convex_parts, joined_boxes
 from scenicq.geometry.fields import VectorField
 from scenicq.geometry.shapes import Bounds, Shape, polygonal_part
 from scenicq.geometry.terms import overlap
 from scenicq.smt.distance_terms import squared_distance
-from scenicq.smt.formula import Formula, Operator, Term, apply, compare, conjunction, disjunction, negation
+from scenicq.smt.problem import Formula, Term
 from scenicq.smt.region_membership import TermVector, convex_cell
+from scenicq.smt.terms import apply, compare, conjunction, disjunction, negation
 
 __all__ = ["field_cells"]
 
@@ -86,7 +88,7 @@ def _guard(guard: Guard, point: TermVector) -> Formula:
 
 def _least(point: TermVector, segments: Segments) -> Term:
     """The square of the distance to the nearest of some segments: squares compare alike, and are polynomial."""
-    return apply(Operator.MIN, *(squared_distance(point, segment) for segment in segments.tolist()))
+    return apply(ArithmeticOp.MIN, *(squared_distance(point, segment) for segment in segments.tolist()))
 
 
 def _inside(point: TermVector, area: Shape) -> Formula:

@@ -9,86 +9,68 @@ function: no solution is lost, and a witness must be replayed.
 from __future__ import annotations
 
 import math
+from typing import cast
 
-from scenicq.smt.formula import (
-    Conjunction,
-    Disjunction,
-    Formula,
-    Op,
-    Operator,
-    Problem,
-    Term,
-    TermComparison,
-    Var,
-    Variable,
-    compare,
-    conjunction,
-    disjunction,
-    postorder,
-)
+from scenicq.forest.nodes import Arithmetic, ArithmeticOp, Compare, Logic, LogicOp, Node
+from scenicq.forest.walk import children, postorder, rebuild
+from scenicq.smt.problem import Formula, Problem, Term, Variable
+from scenicq.smt.terms import apply, compare, conjunction, disjunction
 
 __all__ = ["without_inverses"]
 
 _ROUNDING = 1e-15
 _RANGES = {
-    Operator.ATAN2: (-math.pi, math.pi),
-    Operator.ASIN: (-math.pi / 2, math.pi / 2),
-    Operator.ACOS: (0.0, math.pi),
+    ArithmeticOp.ATAN2: (-math.pi, math.pi),
+    ArithmeticOp.ASIN: (-math.pi / 2, math.pi / 2),
+    ArithmeticOp.ACOS: (0.0, math.pi),
 }
 
 
 def without_inverses(problem: Problem) -> Problem:
     """The problem without `atan2`, arc sine and arc cosine; it has more variables, whose names start with a space."""
-    order = postorder(problem.constraint)
-    if not any(isinstance(node, Op) and node.op in _RANGES for node in order):
+    order = list(postorder((problem.constraint,)))
+    if not any(isinstance(node, Arithmetic) and node.op in _RANGES for node in order):
         return problem
     variables = list(problem.variables)
-    terms: dict[int, Term] = {}
-    relations: dict[int, dict[TermComparison, None]] = {}
-    formulas: dict[int, Formula] = {}
+    made: dict[int, Node] = {}
+    relations: dict[int, dict[Formula, None]] = {}
     for node in order:
         match node:
-            case Op(operator, args):
+            case Logic():
+                connected = conjunction if node.op is LogicOp.AND else disjunction
+                made[id(node)] = connected(cast(Formula, made[id(arg)]) for arg in node.args)
+            case Arithmetic() | Compare():
+                args = children(node)
                 found = {atom: None for arg in args for atom in relations.get(id(arg), ())}
-                new = tuple(terms.get(id(arg), arg) for arg in args)
-                if operator in _RANGES:
-                    terms[id(node)], atoms = _related(operator, new, variables)
+                new = tuple(made[id(arg)] for arg in args)
+                if isinstance(node, Arithmetic) and node.op in _RANGES:
+                    made[id(node)], atoms = _related(node.op, cast("tuple[Term, ...]", new), variables)
                     found.update(dict.fromkeys(atoms))
                 else:
-                    terms[id(node)] = Op(operator, new)
-                if found:
+                    made[id(node)] = rebuild(node, new)
+                if isinstance(node, Compare):
+                    made[id(node)] = conjunction([cast(Compare, made[id(node)]), *found])
+                elif found:
                     relations[id(node)] = found
-            case TermComparison(relation, left, right):
-                found = {**relations.get(id(left), {}), **relations.get(id(right), {})}
-                atom = TermComparison(relation, terms.get(id(left), left), terms.get(id(right), right))
-                formulas[id(node)] = conjunction([atom, *found])
-            case Conjunction(args):
-                formulas[id(node)] = conjunction(formulas[id(arg)] for arg in args)
-            case Disjunction(args):
-                formulas[id(node)] = disjunction(formulas[id(arg)] for arg in args)
             case _:
-                terms[id(node)] = node
-    return Problem(tuple(variables), formulas[id(problem.constraint)])
+                made[id(node)] = node
+    return Problem(tuple(variables), cast(Formula, made[id(problem.constraint)]))
 
 
-def _related(
-    operator: Operator, args: tuple[Term, ...], variables: list[Variable]
-) -> tuple[Term, list[TermComparison]]:
+def _related(op: ArithmeticOp, args: tuple[Term, ...], variables: list[Variable]) -> tuple[Term, list[Formula]]:
     """A new angle, and what relates it to the arguments; new variables are added to the list."""
-    low, high = _RANGES[operator]
-    angle = Var(f" {len(variables)}")
-    variables.append(Variable(angle.name, low - _ROUNDING, high + _ROUNDING))
-    sine, cosine = Op(Operator.SIN, (angle,)), Op(Operator.COS, (angle,))
-    if operator is Operator.ASIN:
-        return angle, _equalities((sine, args[0]))
-    if operator is Operator.ACOS:
-        return angle, _equalities((cosine, args[0]))
-    length = Var(f" {len(variables)}")
-    variables.append(Variable(length.name, 0.0, math.inf))
+    low, high = _RANGES[op]
+    angle = _new(variables, low - _ROUNDING, high + _ROUNDING)
+    sine, cosine = apply(ArithmeticOp.SIN, angle), apply(ArithmeticOp.COS, angle)
+    if op is not ArithmeticOp.ATAN2:
+        return angle, [compare("==", sine if op is ArithmeticOp.ASIN else cosine, args[0])]
+    length = _new(variables, 0.0, math.inf)
     y, x = args
-    return angle, _equalities((Op(Operator.MUL, (length, sine)), y), (Op(Operator.MUL, (length, cosine)), x))
+    return angle, [
+        compare("==", apply(ArithmeticOp.MUL, length, each), side) for each, side in ((sine, y), (cosine, x))
+    ]
 
 
-def _equalities(*pairs: tuple[Term, Term]) -> list[TermComparison]:
-    atoms = [compare("==", left, right) for left, right in pairs]
-    return [atom for atom in atoms if isinstance(atom, TermComparison)]
+def _new(variables: list[Variable], low: float, high: float) -> Term:
+    variables.append(Variable.of(f" {len(variables)}", low, high))
+    return variables[-1].leaf

@@ -8,8 +8,10 @@ from typing import TypeAlias, cast
 
 import numpy as np
 
+from scenicq.errors import CannotEvaluate
 from scenicq.forest.bounds import Box
 from scenicq.forest.nodes import (
+    ArithmeticOp,
     Constant,
     DiscAt,
     Node,
@@ -39,15 +41,12 @@ from scenicq.geometry.regions import (
     UnionOf,
 )
 from scenicq.geometry.shapes import Bounds
-from scenicq.smt.formula import FALSE, TRUE, Formula, Operator, Term, apply, compare, conjunction, disjunction, negation
+from scenicq.smt.problem import Formula, Term, is_formula
+from scenicq.smt.terms import FALSE, TRUE, apply, compare, conjunction, disjunction, negation
 
-__all__ = ["TermVector", "UnsupportedError", "convex_cell", "disc", "inside_region", "picked"]
+__all__ = ["TermVector", "convex_cell", "disc", "inside_region", "picked"]
 
 TermVector: TypeAlias = tuple[Term, Term]
-
-
-class UnsupportedError(Exception):
-    """A construct that has no formula; the message says which."""
 
 
 def picked(index: Term | Formula, number: int) -> Formula:
@@ -55,15 +54,16 @@ def picked(index: Term | Formula, number: int) -> Formula:
 
     The index may also be a truth value: 0 is false and 1 is true.
     """
-    if isinstance(index, Formula):
+    if is_formula(index):
         return index if number else negation(index)
-    return conjunction([compare("<=", number - 0.25, index), compare("<=", index, number + 0.25)])
+    term = cast(Term, index)
+    return conjunction([compare("<=", number - 0.25, term), compare("<=", term, number + 0.25)])
 
 
 def disc(dx: Term, dy: Term, radius: Term | float) -> Formula:
     """An offset of at most a radius (figure 19: Disc)."""
-    squares = apply(Operator.ADD, apply(Operator.POW, dx, 2.0), apply(Operator.POW, dy, 2.0))
-    return compare("<=", squares, apply(Operator.POW, radius, 2.0))
+    squares = apply(ArithmeticOp.ADD, apply(ArithmeticOp.POW, dx, 2.0), apply(ArithmeticOp.POW, dy, 2.0))
+    return compare("<=", squares, apply(ArithmeticOp.POW, radius, 2.0))
 
 
 def convex_cell(point: TermVector, polygon: np.ndarray) -> Formula:
@@ -74,16 +74,16 @@ def convex_cell(point: TermVector, polygon: np.ndarray) -> Formula:
         length = math.hypot(bx - ax, by - ay)
         if length > 0:
             nx, ny = float(by - ay) / length, float(ax - bx) / length
-            across = apply(Operator.ADD, apply(Operator.MUL, x, nx), apply(Operator.MUL, y, ny))
+            across = apply(ArithmeticOp.ADD, apply(ArithmeticOp.MUL, x, nx), apply(ArithmeticOp.MUL, y, ny))
             sides.append(compare("<=", across, nx * float(ax) + ny * float(ay)))
     return conjunction(sides)
 
 
 def _local(dx: Term, dy: Term, heading: Term | float) -> TermVector:
     """An offset in the frame of a heading: right and ahead."""
-    c, s = apply(Operator.COS, heading), apply(Operator.SIN, heading)
-    right = apply(Operator.ADD, apply(Operator.MUL, dx, c), apply(Operator.MUL, dy, s))
-    ahead = apply(Operator.SUB, apply(Operator.MUL, dy, c), apply(Operator.MUL, dx, s))
+    c, s = apply(ArithmeticOp.COS, heading), apply(ArithmeticOp.SIN, heading)
+    right = apply(ArithmeticOp.ADD, apply(ArithmeticOp.MUL, dx, c), apply(ArithmeticOp.MUL, dy, s))
+    ahead = apply(ArithmeticOp.SUB, apply(ArithmeticOp.MUL, dy, c), apply(ArithmeticOp.MUL, dx, s))
     return right, ahead
 
 
@@ -92,10 +92,10 @@ def _wedge(right: Term, ahead: Term, half: float) -> Formula:
     if half >= math.pi:
         return TRUE
     c, s = math.cos(half), math.sin(half)
-    reach = apply(Operator.MUL, ahead, s)
-    side = apply(Operator.MUL, right, c)
+    reach = apply(ArithmeticOp.MUL, ahead, s)
+    side = apply(ArithmeticOp.MUL, right, c)
     left_of = compare("<=", side, reach)
-    right_of = compare("<=", apply(Operator.NEG, side), reach)
+    right_of = compare("<=", apply(ArithmeticOp.NEG, side), reach)
     return conjunction([left_of, right_of]) if half <= math.pi / 2 else disjunction([left_of, right_of])
 
 
@@ -107,13 +107,13 @@ def _sector(dx: Term, dy: Term, radius: Term | float, heading: Term | float, ang
 def _rectangle(dx: Term, dy: Term, heading: Term | float, width: Term | float, length: Term | float) -> Formula:
     right, ahead = _local(dx, dy, heading)
     return conjunction(
-        compare("<=", apply(Operator.ABS, offset), apply(Operator.MUL, size, 0.5))
+        compare("<=", apply(ArithmeticOp.ABS, offset), apply(ArithmeticOp.MUL, size, 0.5))
         for offset, size in ((right, width), (ahead, length))
     )
 
 
 def _offset(point: TermVector, center: tuple[Term | float, Term | float]) -> TermVector:
-    return apply(Operator.SUB, point[0], center[0]), apply(Operator.SUB, point[1], center[1])
+    return apply(ArithmeticOp.SUB, point[0], center[0]), apply(ArithmeticOp.SUB, point[1], center[1])
 
 
 def _near(edge: np.ndarray, limits: Bounds) -> bool:
@@ -130,8 +130,8 @@ def _segment(point: TermVector, edge: np.ndarray) -> Formula:
     if length == 0:
         return conjunction([compare("==", point[0], x0), compare("==", point[1], y0)])
     ux, uy = (x1 - x0) / length, (y1 - y0) / length
-    along = apply(Operator.ADD, apply(Operator.MUL, point[0], ux), apply(Operator.MUL, point[1], uy))
-    across = apply(Operator.SUB, apply(Operator.MUL, point[0], uy), apply(Operator.MUL, point[1], ux))
+    along = apply(ArithmeticOp.ADD, apply(ArithmeticOp.MUL, point[0], ux), apply(ArithmeticOp.MUL, point[1], uy))
+    across = apply(ArithmeticOp.SUB, apply(ArithmeticOp.MUL, point[0], uy), apply(ArithmeticOp.MUL, point[1], ux))
     start = ux * x0 + uy * y0
     return conjunction(
         [
@@ -192,7 +192,7 @@ def inside_region(region: Node, point: TermVector, around: Box, code: Callable[[
         code: Gives the term of a subexpression.
 
     Raises:
-        UnsupportedError: The region is a sector of random angle.
+        CannotEvaluate: The region is a sector of random angle.
     """
     known: dict[int, Formula] = {}
     todo = [region]
@@ -234,7 +234,7 @@ def _inside(
             return disc(*_offset(point, cast(TermVector, code(region.center))), cast(Term, code(region.radius)))
         case SectorAt():
             if not isinstance(region.angle, Constant):
-                raise UnsupportedError("a view of random angle")
+                raise CannotEvaluate("a view of random angle")
             offset = _offset(point, cast(TermVector, code(region.center)))
             radius, heading = cast(Term, code(region.radius)), cast(Term, code(region.heading))
             return _sector(*offset, radius, heading, cast(float, region.angle.value))
@@ -253,4 +253,4 @@ def _inside(
             index = cast("Term | Formula", code(region.index))
             return disjunction(conjunction([picked(index, number), part]) for number, part in enumerate(parts))
         case _:
-            raise UnsupportedError(f"a region given as {type(region).__name__}")
+            raise CannotEvaluate(f"a region given as {type(region).__name__}")

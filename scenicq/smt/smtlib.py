@@ -10,13 +10,17 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections import Counter
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from decimal import Decimal
 from fractions import Fraction
+from typing import cast
 
+from scenicq.forest.nodes import Arithmetic, ArithmeticOp, Compare, Constant, Identity, Logic, Range
+from scenicq.forest.walk import children, postorder
 from scenicq.smt.answer import Answer, NoAnswer, Sat, Unsat
-from scenicq.smt.formula import Problem, Row, flatten
 from scenicq.smt.inverse_elimination import without_inverses
+from scenicq.smt.problem import Formula, Problem, Term
 
 __all__ = ["read_reply", "to_smtlib"]
 
@@ -82,8 +86,8 @@ _RESERVED = frozenset(
 )
 _LONGEST = 60
 """Nesting of an expression beyond which a part of it gets a definition."""
-_RELATIONS = ("<=", "<", "==")
-_NAMES = {"add": "+", "mul": "*", "sub": "-", "neg": "-", "div": "/", "==": "=", "<": "<", "<=": "<="}
+_NAMES = {"neg": "-", "==": "="}
+"""What SMT-LIB calls otherwise than the forest."""
 
 
 def to_smtlib(problem: Problem, precision: float) -> str:
@@ -94,7 +98,6 @@ def to_smtlib(problem: Problem, precision: float) -> str:
         precision: The δ of delta-complete solvers; others ignore it.
     """
     problem = without_inverses(problem)
-    rows = flatten(problem.constraint)
     names = _symbols(variable.name for variable in problem.variables)
     lines = ["(set-option :produce-models true)", "(set-logic QF_NRA)", f"(set-info :precision {_decimal(precision)})"]
     for variable in problem.variables:
@@ -104,7 +107,8 @@ def to_smtlib(problem: Problem, precision: float) -> str:
             lines.append(f"(assert (<= {_number(variable.low)} {name}))")
         if variable.high < math.inf:
             lines.append(f"(assert (<= {name} {_number(variable.high)}))")
-    definitions, constraint = _expressions(rows, names, precision)
+    known = {variable.leaf.identity: names[variable.name] for variable in problem.variables}
+    definitions, constraint = _expressions(problem.constraint, known, precision)
     lines += [*definitions, f"(assert {constraint})", "(check-sat)", "(get-model)", "(exit)"]
     return "\n".join(lines) + "\n"
 
@@ -127,57 +131,67 @@ def _number(value: float) -> str:
     return f"(- {_decimal(-value)})" if value < 0 else _decimal(abs(value))
 
 
-def _divisors(rows: Sequence[Row]) -> list[frozenset[int]]:
-    """The rows that a row divides by, itself or below: where one of them is zero, the row is undefined."""
-    found: list[frozenset[int]] = []
-    for kind, _, children in rows:
-        below: set[int] = set()
-        if kind not in ("and", "or"):
-            below.update(*(found[child] for child in children))
-        if kind == "div" and not _is_number(rows[children[1]]):
-            below.add(children[1])
-        if kind == "pow" and float(rows[children[1]][1]) < 0:
-            below.add(children[0])
-        found.append(frozenset(below))
-    return found
+def _numbered(root: Formula) -> list[tuple[Formula | Term, tuple[int, ...]]]:
+    """Every part once, each with the numbers of those below it, the root last; equal parts have one number."""
+    numbers: dict[int, int] = {}
+    known: dict[Hashable, int] = {}
+    parts: list[tuple[Formula | Term, tuple[int, ...]]] = []
+    for node in cast("Iterable[Formula | Term]", postorder((root,))):
+        below = () if isinstance(node, Range) else tuple(numbers[id(child)] for child in children(node))
+        match node:
+            case Constant(value):
+                own = type(value), value
+            case Range():
+                own = node.identity
+            case _:
+                own = node.op
+        numbers[id(node)] = number = known.setdefault((own, below), len(parts))
+        if number == len(parts):
+            parts.append((node, below))
+    return parts
 
 
-def _is_number(row: Row) -> bool:
-    """Whether a row is a constant other than zero."""
-    return row[0] == "num" and float(row[1]) != 0
+def _zeros(node: Formula | Term, below: tuple[int, ...]) -> tuple[int, ...]:
+    """The number of what a node divides by, unless it is known and not zero: where that is zero, it is undefined."""
+    match node:
+        case Arithmetic(ArithmeticOp.DIV, (_, by)) if not (isinstance(by, Constant) and by.value):
+            return below[1:]
+        case Arithmetic(ArithmeticOp.POW, (_, Constant(value=float() as exponent))) if exponent < 0:
+            return below[:1]
+        case _:
+            return ()
 
 
-def _expressions(rows: Sequence[Row], names: dict[str, str], precision: float) -> tuple[list[str], str]:
-    """Definitions of parts that are shared or deep, and the expression of the last row."""
-    uses = [0] * len(rows)
-    for _, _, children in rows:
-        for child in children:
-            uses[child] += 1
+def _expressions(root: Formula, names: Mapping[Identity, str], precision: float) -> tuple[list[str], str]:
+    """Definitions of parts that are shared or deep, and the expression of the root."""
+    numbered = _numbered(root)
+    uses = Counter(child for _, below in numbered for child in below)
     definitions: list[str] = []
-    divisors = _divisors(rows)
     texts: list[str] = []
     depths: list[int] = []
-    for number, (kind, text, children) in enumerate(rows):
-        if kind in ("var", "num"):
-            texts.append(names[text] if kind == "var" else _number(float(text)))
-            depths.append(0)
-            continue
-        args = [texts[child] for child in children]
-        if kind in ("abs", "min", "max", "pow"):
-            # these repeat their arguments
-            args = [_named(f"t!{number}.{place}", arg, definitions) for place, arg in enumerate(args)]
-        if kind in _RELATIONS and all(rows[child][0] == "num" for child in children):
-            # only atoms that rounding decides are ground
-            close = abs(float(rows[children[0]][1]) - float(rows[children[1]][1])) <= precision
-            written = "true" if close else "false"
-        else:
-            written = _application(kind, args, [rows[child] for child in children])
-        if kind in _RELATIONS and divisors[number]:
-            zeros = " ".join(f"(not (= {texts[divisor]} 0.0))" for divisor in sorted(divisors[number]))
-            written = f"(and {zeros} {written})"
-        depth = 1 + max((depths[child] for child in children), default=0)
-        if number < len(rows) - 1 and (uses[number] > 1 or depth > _LONGEST):
-            sort = "Bool" if kind in ("and", "or", *_RELATIONS) else "Real"
+    zeros: list[frozenset[int]] = []
+    for number, (node, below) in enumerate(numbered):
+        inner = () if isinstance(node, Logic) else (zeros[child] for child in below)
+        zeros.append(frozenset(_zeros(node, below)).union(*inner))
+        args = [texts[child] for child in below]
+        match node:
+            case Compare(_, Constant(value=float() as left), Constant(value=float() as right)):
+                # only comparisons that rounding decides are of numbers
+                written = "true" if abs(left - right) <= precision else "false"
+            case Compare() if zeros[number]:
+                nonzero = " ".join(f"(not (= {texts[divisor]} 0.0))" for divisor in sorted(zeros[number]))
+                written = f"(and {nonzero} {_application(node.op, args)})"
+            case Compare() | Logic():
+                written = _application(node.op, args)
+            case Arithmetic():
+                written = _operation(node, args, f"t!{number}", definitions)
+            case Range():
+                written = names[node.identity]
+            case Constant():
+                written = str(node.value).lower() if isinstance(node.value, bool) else _number(cast(float, node.value))
+        depth = 1 + max((depths[child] for child in below), default=-1)
+        if below and uses[number] and (uses[number] > 1 or depth > _LONGEST):
+            sort = "Real" if isinstance(node, Arithmetic) else "Bool"
             definitions.append(f"(define-fun t!{number} () {sort} {written})")
             written, depth = f"t!{number}", 0
         texts.append(written)
@@ -185,31 +199,32 @@ def _expressions(rows: Sequence[Row], names: dict[str, str], precision: float) -
     return definitions, texts[-1]
 
 
+def _operation(node: Arithmetic, args: list[str], name: str, definitions: list[str]) -> str:
+    """An operation; those that repeat their arguments define them first."""
+    if node.op in (ArithmeticOp.ABS, ArithmeticOp.MIN, ArithmeticOp.MAX, ArithmeticOp.POW):
+        args = [_named(f"{name}.{place}", arg, definitions) for place, arg in enumerate(args)]
+    match node.op:
+        case ArithmeticOp.ABS:
+            return f"(ite (<= 0.0 {args[0]}) {args[0]} (- {args[0]}))"
+        case ArithmeticOp.MIN:
+            return f"(ite (<= {args[0]} {args[1]}) {args[0]} {args[1]})"
+        case ArithmeticOp.MAX:
+            return f"(ite (<= {args[1]} {args[0]}) {args[0]} {args[1]})"
+        case ArithmeticOp.POW:
+            return _power(args[0], int(cast(float, cast(Constant, node.args[1]).value)))
+        case _:
+            return _application(node.op, args)
+
+
+def _application(name: str, args: Sequence[str]) -> str:
+    return f"({_NAMES.get(name, name)} {' '.join(args)})"
+
+
 def _named(name: str, text: str, definitions: list[str]) -> str:
     if not text.startswith("("):
         return text
     definitions.append(f"(define-fun {name} () Real {text})")
     return name
-
-
-def _application(kind: str, args: list[str], children: list[Row]) -> str:
-    match kind:
-        case "and" | "or" if not args[1:]:
-            return args[0] if args else ("true" if kind == "and" else "false")
-        case "add" | "mul" if len(args) == 1:
-            return args[0]
-        case "abs":
-            return f"(ite (<= 0.0 {args[0]}) {args[0]} (- {args[0]}))"
-        case "min" | "max":
-            chosen = args[0]
-            for arg in args[1:]:
-                first, second = (chosen, arg) if kind == "min" else (arg, chosen)
-                chosen = f"(ite (<= {first} {second}) {chosen} {arg})"
-            return chosen
-        case "pow":
-            return _power(args[0], int(float(children[1][1])))
-        case _:
-            return f"({_NAMES.get(kind, kind)} {' '.join(args)})"
 
 
 def _power(base: str, exponent: int) -> str:

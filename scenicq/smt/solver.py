@@ -8,7 +8,8 @@ from scenicq.errors import Diagnostic, SolverError
 from scenicq.limits import LIMITS
 from scenicq.smt.answer import Answer, NoAnswer, Sat, Solver, SolverSession, SolverStatus, Unsat
 from scenicq.smt.command import SmtlibSolver
-from scenicq.smt.formula import TRUE, Problem
+from scenicq.smt.problem import Problem
+from scenicq.smt.terms import TRUE
 from scenicq.smt.worker_solver import WorkerSolver
 
 __all__ = [

@@ -10,22 +10,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import cast
 
-from scenicq.forest.nodes import CompareOp, Constant, LogicOp, Node, RectangleAt, Undefined, Value
+from scenicq.errors import CannotEvaluate
+from scenicq.forest.nodes import ArithmeticOp, CompareOp, Constant, LogicOp, Node, RectangleAt, Undefined, Value
 from scenicq.geometry.regions import Rectangle, Region
-from scenicq.smt.formula import (
-    FALSE,
-    TRUE,
-    Formula,
-    Num,
-    Operator,
-    Term,
-    apply,
-    compare,
-    conjunction,
-    disjunction,
-    negation,
-)
-from scenicq.smt.region_membership import TermVector, UnsupportedError, picked
+from scenicq.smt.problem import Formula, Term, is_formula, is_term
+from scenicq.smt.region_membership import TermVector, picked
+from scenicq.smt.terms import FALSE, TRUE, apply, compare, conjunction, disjunction, negation, number
 
 __all__ = [
     "CodeChoice",
@@ -48,9 +38,9 @@ def constant_code(value: Value) -> object:
     if isinstance(value, bool):
         return TRUE if value else FALSE
     if isinstance(value, float):
-        return Num(value)
+        return number(value)
     if isinstance(value, tuple):
-        return (Num(value[0]), Num(value[1]))
+        return (number(value[0]), number(value[1]))
     return value
 
 
@@ -65,19 +55,19 @@ def same(code: object, observed: Value) -> Formula:
     """Whether a value that is no number is the one observed."""
     if isinstance(code, CodeChoice):
         return disjunction(conjunction([where, same(value, observed)]) for where, value in code.options)
-    if isinstance(code, Formula):
+    if is_formula(code):
         return FALSE if not isinstance(observed, bool) else code if observed else negation(code)
-    return TRUE if not isinstance(code, Term) and code == observed else FALSE
+    return TRUE if not is_term(code) and code == observed else FALSE
 
 
 def known_region(node: Node) -> Region:
     """The region that an expression is, if it is known.
 
     Raises:
-        UnsupportedError: It is random.
+        CannotEvaluate: It is random.
     """
     if not isinstance(node, Constant):
-        raise UnsupportedError("a measure of a region that is random itself")
+        raise CannotEvaluate("a measure of a region that is random itself")
     return cast(Region, node.value)
 
 
@@ -88,13 +78,13 @@ def is_box(node: Node) -> bool:
 
 def truth(code: object) -> Formula:
     """A code as a condition: numbers other than 0 hold."""
-    if isinstance(code, Formula):
+    if is_formula(code):
         return code
     if isinstance(code, CodeChoice):
         return disjunction(conjunction([where, truth(value)]) for where, value in code.options)
     if isinstance(code, Undefined):
         return FALSE
-    if isinstance(code, Term):
+    if is_term(code):
         return disjunction([compare("<", code, 0.0), compare("<", 0.0, code)])
     return TRUE if code else FALSE
 
@@ -117,10 +107,10 @@ def cases(index: Term | Formula, options: Sequence[Formula]) -> Formula:
 def rotated(vector: TermVector, angle: Term) -> TermVector:
     """A vector turned counter-clockwise."""
     x, y = vector
-    c, s = apply(Operator.COS, angle), apply(Operator.SIN, angle)
+    c, s = apply(ArithmeticOp.COS, angle), apply(ArithmeticOp.SIN, angle)
     return (
-        apply(Operator.SUB, apply(Operator.MUL, x, c), apply(Operator.MUL, y, s)),
-        apply(Operator.ADD, apply(Operator.MUL, x, s), apply(Operator.MUL, y, c)),
+        apply(ArithmeticOp.SUB, apply(ArithmeticOp.MUL, x, c), apply(ArithmeticOp.MUL, y, s)),
+        apply(ArithmeticOp.ADD, apply(ArithmeticOp.MUL, x, s), apply(ArithmeticOp.MUL, y, c)),
     )
 
 
@@ -132,8 +122,8 @@ def compare_codes(op: CompareOp, left: object, right: object) -> Formula:
             return disjunction(conjunction([where, compare_codes(op, *sides)]) for where, sides in pairs)
     if isinstance(left, Undefined) or isinstance(right, Undefined):
         return FALSE
-    if not (isinstance(left, Term) and isinstance(right, Term)):
-        if isinstance(left, Formula) or isinstance(right, Formula):
+    if not (is_term(left) and is_term(right)):
+        if is_formula(left) or is_formula(right):
             alike = _alike(left, right)
             return alike if op is CompareOp.EQ else negation(alike)
         return TRUE if (left == right) == (op is CompareOp.EQ) else FALSE
@@ -144,12 +134,11 @@ def compare_codes(op: CompareOp, left: object, right: object) -> Formula:
 
 def _alike(left: object, right: object) -> Formula:
     """That two values are equal, of which one at least is a truth value; as a number it is 1 or 0."""
-    if not isinstance(left, Formula):
-        left, right = right, left
-    assert isinstance(left, Formula)
-    if isinstance(right, Formula):
+    if not is_formula(left):
+        return _alike(right, left) if is_formula(right) else FALSE
+    if is_formula(right):
         true, false = right, negation(right)
-    elif isinstance(right, Term):
+    elif is_term(right):
         true, false = compare("==", right, 1.0), compare("==", right, 0.0)
     else:
         return FALSE

@@ -24,7 +24,7 @@ from typing import IO, Any, TypeGuard, cast
 from scenicq.processes import limit_memory
 from scenicq.refusals import refused_by_system
 from scenicq.smt.answer import Answer, NoAnswer, Sat, Unsat
-from scenicq.smt.formula import Problem
+from scenicq.smt.problem import Problem
 
 __all__ = ["Check", "Request", "Setup", "read_answer", "seconds_of", "serve", "write_answer"]
 

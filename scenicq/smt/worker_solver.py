@@ -24,8 +24,7 @@ from scenicq.errors import Diagnostic, SolverError
 from scenicq.limits import LIMITS
 from scenicq.processes import end_group, ended_after
 from scenicq.smt.answer import Answer, NoAnswer, Sat
-from scenicq.smt.evaluation import holds
-from scenicq.smt.formula import Problem
+from scenicq.smt.problem import Problem, holds
 from scenicq.smt.worker import Request, Setup, read_answer, seconds_of
 
 __all__ = ["WorkerSolver"]

@@ -15,6 +15,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from scenicq.number_ranges import expand_ranges
 from scenicq.store.schema import ArrowArray
 
 __all__ = ["FEW", "MOST_BYTES", "Texts", "lists_at", "number_array", "repeated_texts"]
@@ -53,7 +54,7 @@ def lists_at(values: Sequence[Sequence[float]], at: NDArray[np.intp]) -> ArrowAr
     flat = np.fromiter(chain.from_iterable(values), np.float64, int(sizes.sum()))
     starts, many = np.cumsum(sizes) - sizes, sizes[at]
     ends = np.cumsum(many)
-    places = np.arange(many.sum()) + np.repeat(starts[at] - (ends - many), many)
+    places = expand_ranges(starts[at], many)
     return pa.Array.from_buffers(
         pa.list_(pa.float64()),
         len(at),

@@ -11,6 +11,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from scenicq.geometry.angles import normalize_array
 from scenicq.geometry.centerlines import centerlines, lane_direction
 from scenicq.geometry.features import MapFeature, names
 from scenicq.geometry.own_directions import along_centerline
@@ -99,6 +100,52 @@ class MapIndex:
             return self._directions(xy[member], lane)
 
         return last_lanes(times_us, tracks, headings, pairs, ways, lambda lane: self._continued[lane])
+
+    def turns(
+        self,
+        xy: NDArray[np.float64],
+        place: NDArray[np.intp],
+        headings: NDArray[np.float64],
+        near: Memberships,
+    ) -> NDArray[np.float64]:
+        """How far each lane, or lane of a section, leads from the heading of who is in it, shape as of `near`.
+
+        It is 0 for who has no heading, and nan of what is no lane, has no direction there or does not contain them.
+
+        Args:
+            xy: Where each is, shape (n, 2).
+            place: The number of the place of each; who stands at the same place has the same.
+            headings: That of each; nan where it is not known.
+            near: The regions near each.
+        """
+        found = np.full(len(near.point), np.nan)
+        lane = self._lane_of[near.feature] if len(self._features) else np.empty(0, dtype=np.int64)
+        inside = np.flatnonzero((near.distance == 0) & (lane >= 0))
+        if not len(inside):
+            return found
+        member, lane = near.point[inside], lane[inside]
+        _, first, at = np.unique(place[member] * len(self._features) + lane, return_index=True, return_inverse=True)
+        ways = self._directions(xy[member[first]], lane[first])
+        # of several directions at a place the nearest counts
+        turns = np.full(len(inside), np.inf)
+        for rank in range(max(map(len, ways))):
+            way = np.array([each[rank] if rank < len(each) else np.nan for each in ways])[at]
+            turns = np.fmin(turns, np.abs(normalize_array(way - headings[member])))
+        turns[np.isinf(turns)] = np.nan
+        turns[np.isnan(headings[member])] = 0.0
+        found[inside] = turns
+        return found
+
+    @cached_property
+    def _lane_of(self) -> NDArray[np.int64]:
+        """The number of the lane that each element is, or is a section of; -1 of all others."""
+        found = np.where(self._is_lane, np.arange(len(self._features)), -1)
+        lanes = {self._features[number].id: number for number in np.flatnonzero(self._is_lane).tolist()}
+        for number, feature in enumerate(self._features):
+            if feature.kind == "lane_section":
+                own = (lanes[name] for name in names(feature, "lane") if name in lanes)
+                found[number] = next(own, -1)
+        return found
 
     @cached_property
     def _continued(self) -> dict[int, frozenset[int]]:

@@ -16,6 +16,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from scenicq.geometry.camera import Camera
+from scenicq.number_ranges import expand_ranges
 from scenicq.store.camera_rows import CAMERA_COLUMNS, cameras_of
 from scenicq.store.columns import OUT_OF_PLANE
 from scenicq.store.labels import Label, LabelObject, Motion, OutOfPlane
@@ -107,8 +108,7 @@ def _members(rows: RowFile, frames: ArrowTable, what: str) -> ArrowTable:
     """The rows of another table that belong to some frames."""
     first = frames[f"first_{what}"].to_numpy().astype(np.int64)
     counts = frames[f"{what}_count"].to_numpy().astype(np.int64)
-    ends = np.cumsum(counts)
-    return rows.take(np.repeat(first - (ends - counts), counts) + np.arange(counts.sum()))
+    return rows.take(expand_ranges(first, counts))
 
 
 class RowFile:

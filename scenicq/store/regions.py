@@ -88,6 +88,11 @@ class MapFiles:
                 self._traits.update(dict.fromkeys(group.maps, traits))
         return self._traits.get(map_name)
 
+    def count_alike(self, traits: MapTraits) -> int:
+        """How many maps are known to have some traits."""
+        groups = (each for each in self.groups if MapTraits(frozenset(each.kinds), each.directed) == traits)
+        return sum(len(each.maps) for each in groups)
+
     def features(self, map_name: str) -> tuple[MapFeature, ...]:
         """The elements of one map, equal to those that were written."""
         features: list[MapFeature] = []
@@ -149,6 +154,10 @@ class _WrittenProperties(Mapping[str, Any]):
     def __getitem__(self, key: str) -> Any:
         """One of them."""
         return self._read()[key]
+
+    def get(self, key: str, default: Any = None) -> Any:
+        """One of them, or what is given where there is none: most that are asked for are not there."""
+        return self._read().get(key, default)
 
     def __iter__(self) -> Iterator[str]:
         """Their names."""

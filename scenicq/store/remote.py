@@ -13,7 +13,7 @@ from __future__ import annotations
 import hashlib
 import io
 import threading
-from collections import OrderedDict, deque
+from collections import deque
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -22,6 +22,7 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, BinaryIO, Self, cast
 
 from scenicq.errors import DataError, Diagnostic
+from scenicq.recent import Recent
 from scenicq.store.manifest import MANIFEST, Part
 
 if TYPE_CHECKING:  # an ingest needs no DuckDB, which is slow to load
@@ -81,9 +82,8 @@ class RemoteFolder:
     name: str
     files: Any = field(repr=False)
     root: str
-    _tails: OrderedDict[str, bytes] = field(default_factory=OrderedDict[str, bytes], init=False, repr=False)
+    _tails: Recent[str, bytes] = field(default_factory=lambda: Recent(_TAILS), init=False, repr=False)
     _failures: deque[DataError] = field(default_factory=lambda: deque[DataError](maxlen=1), init=False, repr=False)
-    _lock: threading.Lock = field(default_factory=threading.Lock, init=False, repr=False)
 
     @classmethod
     def at(cls, address: str) -> Self:
@@ -187,16 +187,7 @@ class RemoteFolder:
 
     def tail(self, part: Part) -> bytes:
         """The end of a file."""
-        with self._lock:
-            if (known := self._tails.get(part.path)) is not None:
-                self._tails.move_to_end(part.path)
-                return known
-        data = self.fetch(part, max(0, part.bytes - _TAIL), part.bytes)
-        with self._lock:
-            self._tails[part.path] = data
-            while len(self._tails) > _TAILS:
-                self._tails.popitem(last=False)
-        return data
+        return self._tails.get(part.path, lambda: self.fetch(part, max(0, part.bytes - _TAIL), part.bytes))
 
 
 def file_system(address: str) -> tuple[Any, str]:

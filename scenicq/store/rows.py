@@ -13,6 +13,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from scenicq.geometry.angles import normalize_array
+from scenicq.number_ranges import expand_ranges
 from scenicq.store.arrays import lists_at, number_array, repeated_texts
 from scenicq.store.camera_rows import camera_columns
 from scenicq.store.columns import OUT_OF_PLANE, MemberColumns, Memberships, RecordingColumns
@@ -50,13 +51,13 @@ def recording_rows(
     # no motion crosses a label without an ego
     passages = accumulate(int(not category) for category in egos.category)
     one_track = [f"ego {n}" if category else None for n, category in zip(passages, egos.category, strict=True)]
-    last_lane = np.full(len(xy), -1)
+    last_lane, turns = np.full(len(xy), -1), np.empty(0)
     if index is not None:
-        order = np.concatenate((ego_at, object_at))
+        by_place = np.argsort(np.concatenate((ego_at, object_at)))
         when, headings = np.concatenate((times, times[label_of])), np.concatenate((egos.heading, objects.heading))
-        tracks = tracks_of_both(one_track, objects.track)
-        by_place = np.argsort(order)
-        last_lane = index.last_lanes(when[by_place], tracks[by_place], xy, headings[by_place], placed.near)
+        headings, tracks = headings[by_place], tracks_of_both(one_track, objects.track)
+        last_lane = index.last_lanes(when[by_place], tracks[by_place], xy, headings, placed.near)
+        turns = index.turns(xy, placed.place, headings, placed.near)
     return {
         "labels": _table(
             "labels",
@@ -94,7 +95,7 @@ def recording_rows(
                 "last_lane": _known(last_lane[object_at]),
             },
         ),
-        "memberships": _table("memberships", _memberships(columns, index, placed, ego_at, object_at)),
+        "memberships": _table("memberships", _memberships(columns, index, placed, ego_at, object_at, turns)),
         "sensors": _table(
             "sensors",
             {
@@ -136,7 +137,7 @@ def _placed(index: MapIndex | None, xy: NDArray[np.float64]) -> _Placed:
     counts = np.bincount(near.point, minlength=len(places))
     many = counts[at]
     point = np.repeat(np.arange(n), many)
-    pair = np.arange(len(point)) + np.repeat((np.cumsum(counts) - counts)[at] - (np.cumsum(many) - many), many)
+    pair = expand_ranges((np.cumsum(counts) - counts)[at], many)
     everywhere = Memberships(point, near.feature[pair], near.distance[pair])
     return _Placed(everywhere, index.lanes(places, near)[at], at, index.road_directions(places))
 
@@ -147,6 +148,7 @@ def _memberships(
     placed: _Placed,
     ego_at: NDArray[np.int64],
     object_at: NDArray[np.int64],
+    turns: NDArray[np.float64],
 ) -> dict[str, Any]:
     near = placed.near
     many = np.bincount(near.point, minlength=len(placed.lane))
@@ -162,6 +164,7 @@ def _memberships(
         "kind": pa.nulls(0, pa.string()) if index is None else index.kinds.at(near.feature),
         "region": _names(index, near.feature),
         "distance": near.distance,
+        "turn": turns,
     }
 
 

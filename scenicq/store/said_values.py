@@ -11,7 +11,7 @@ from scenicq.store.dataset import Dataset
 if TYPE_CHECKING:
     import duckdb
 
-__all__ = ["SaidValues", "said_attributes", "said_params"]
+__all__ = ["SaidValues", "said_attributes", "said_params", "said_types"]
 
 
 @dataclass(slots=True)
@@ -29,10 +29,29 @@ class SaidValues:
     others: dict[str, int] = field(default_factory=dict[str, int])
 
 
+_ATTRIBUTES = "(SELECT attributes AS said FROM objects UNION ALL SELECT ego_attributes FROM labels)"
+_TYPES = {"VARCHAR": str, "BOOLEAN": bool}
+"""What JSON has beside numbers."""
+
+
+def said_types(dataset: Dataset) -> Mapping[str, frozenset[type]]:
+    """The types of the values of each attribute of egos and objects."""
+    found: dict[str, set[type]] = {}
+    with dataset.blamed(), dataset.connect() as connection:
+        rows = connection.execute(
+            "SELECT DISTINCT name, json_type(said, '/' || replace(replace(name, '~', '~0'), '/', '~1')) FROM ("
+            f"SELECT unnest(json_keys(said)) AS name, said FROM (SELECT DISTINCT said FROM {_ATTRIBUTES} "
+            "WHERE said IS NOT NULL))"
+        ).fetchall()
+    for name, kind in rows:
+        found.setdefault(name, set()).add(_TYPES.get(kind, float))
+    return {name: frozenset(types) for name, types in found.items()}
+
+
 def said_attributes(dataset: Dataset) -> Mapping[str, SaidValues]:
     """The attributes of egos and objects by name, those that most have first."""
     with dataset.blamed(), dataset.connect() as connection:
-        return _said(connection, "(SELECT attributes AS said FROM objects UNION ALL SELECT ego_attributes FROM labels)")
+        return _said(connection, _ATTRIBUTES)
 
 
 def said_params(dataset: Dataset) -> Mapping[str, SaidValues]:

@@ -32,10 +32,10 @@ ArrowTable: TypeAlias = Any
 ArrowArray: TypeAlias = Any
 """A `pyarrow.Array`."""
 
-SCHEMA_VERSION = 6
+SCHEMA_VERSION = 7
 """Changes with every change of a table that a reader could notice."""
 
-UPGRADABLE = frozenset({2, 3, 4, 5})
+UPGRADABLE = frozenset({2, 3, 4, 5, 6})
 """Older versions of which `scenicq index` makes this one: it computes anew what is computed."""
 
 ADDED = {4: frozenset({"z", "pitch", "roll", "image_width", "image_height", "intrinsics", "camera_pose"})}
@@ -141,6 +141,8 @@ SCHEMAS: dict[str, Any] = {
             _required("kind", _TEXT),
             _required("region", _TEXT),
             _required("distance", _REAL),  # 0 inside and on the boundary
+            # in a lane or a section of one how far it leads from the heading of who is there; 0 for who has none
+            pa.field("turn", _REAL),
         ]
     ),
     # One row a map element, in the order of the map.

@@ -24,6 +24,7 @@ import msgspec
 import pyarrow as pa
 from msgspec import Struct
 
+from scenicq.recent import Recent
 from scenicq.store.atomic_files import write_whole
 from scenicq.store.columns import RecordingColumns
 from scenicq.store.manifest import SEGMENTS, Counts, Part, Whole
@@ -75,11 +76,14 @@ class SourceRecording(Struct, frozen=True):
         fingerprint: Changes with everything that the recording was made from; "" where nobody asks.
         counts: How often each problem occurred: what, code, name, kept, count.
         told: The first problems of each kind.
+        maps: The map that it is on, with what changes with any element of it, "" where it is not there; none where
+            nothing came of the recording.
     """
 
     fingerprint: str
     counts: tuple[tuple[str, str, str, bool, int], ...] = ()
     told: tuple[SourceProblem, ...] = ()
+    maps: tuple[tuple[str, str], ...] = ()
 
 
 class SegmentFile(Struct, frozen=True, array_like=True):
@@ -154,21 +158,25 @@ def segments_of(weights: Sequence[tuple[str, int]], largest: int = SEGMENT_OBJEC
         yield segment
 
 
+_MAPS_KEPT = 8
+"""Maps of which an index is kept: sources with few maps have their recordings in any order."""
+
+
 class MapIndexes:
-    """Indexes of maps, each made when it is first asked for."""
+    """Indexes of maps, each made when it is asked for; the last few are kept."""
 
     def __init__(self, maps: Mapping[str, Sequence[MapFeature]]) -> None:
         """Take the elements of each map."""
         self._maps = maps
-        self._made: dict[str, MapIndex] = {}
+        self._made: Recent[str, MapIndex] = Recent(_MAPS_KEPT)
 
     def of(self, name: str) -> MapIndex | None:
         """The index of a map; None if it has no elements."""
-        if name not in self._made and self._maps.get(name):
-            from scenicq.store.map_index import MapIndex  # noqa: PLC0415 - slow to load, and for maps
+        if not self._maps.get(name):
+            return None
+        from scenicq.store.map_index import MapIndex  # noqa: PLC0415 - slow to load, and for maps
 
-            self._made[name] = MapIndex(self._maps[name])
-        return self._made.get(name)
+        return self._made.get(name, lambda: MapIndex(self._maps[name]))
 
 
 class _Tally(NamedTuple):

@@ -26,6 +26,7 @@ from scenicq.match.options import MatchOptions
 from scenicq.match.problem.constraints import relevant_properties
 from scenicq.match.problem.preprocess import ready
 from scenicq.match.verdict import Match, NoMatch
+from scenicq.number_ranges import expand_ranges
 from scenicq.smt.answer import Solver
 from scenicq.store.classes import class_matches
 from scenicq.store.labels import Label
@@ -166,7 +167,7 @@ class Arrivals:
         if int(repeats.sum()) > LIMITS.arrival_combinations:
             raise exhausted("arrival_combinations")
         origin = np.repeat(np.arange(len(table)), repeats)
-        combination = order[_spread(starts[binding], repeats)]
+        combination = order[expand_ranges(starts[binding], repeats)]
         # who comes later is not over before
         fits = np.ones(len(origin), np.bool_)
         for life in chosen:
@@ -195,7 +196,7 @@ class Arrivals:
         if int(counts.sum()) > LIMITS.arrival_combinations:
             raise exhausted("arrival_combinations")
         which = np.repeat(np.arange(len(of)), counts)
-        life = order[_spread(low, counts)]
+        life = order[expand_ranges(low, counts)]
         keeps = lives.last[life] > first_label[of[which]]
         keeps &= (bindings[of[which]] != lives.track[life][:, None]).all(axis=1)
         for other in chosen:
@@ -225,7 +226,7 @@ class Arrivals:
             end = max(first + 1, int(np.searchsorted(total, before + _AT_ONCE, side="right")))
             mine = np.arange(first, end)
             which = np.repeat(mine, sizes[mine])
-            at = _spread(low[mine], sizes[mine])
+            at = expand_ranges(low[mine], sizes[mine])
             members = {index: seen.members(bindings[of[which], place], at) for place, index in enumerate(indices)}
             for place, each in enumerate(chosen):
                 members[len(indices) + place] = seen.members(lives.track[each[which]], at)
@@ -302,11 +303,6 @@ def _as_shown(owner: ScenarioObject) -> ScenarioObject:
         for name, given in owner.properties.items()
     }
     return replace(owner, properties=properties, mutated=frozenset(), uncomparable={})
-
-
-def _spread(firsts: Members, counts: Members) -> Members:
-    """From each first number so many that follow, one run after the other."""
-    return np.arange(int(counts.sum())) + np.repeat(firsts - (np.cumsum(counts) - counts), counts)
 
 
 def _within(seen: NDArray[np.bool_], bounds: Members) -> NDArray[np.bool_]:

@@ -40,7 +40,7 @@ from scenicq.forest.nodes import (
 )
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.temporal import Atom
-from scenicq.forest.unobserved import certain_and_possible
+from scenicq.forest.unobserved import certain_and_possible, is_only_observed
 from scenicq.forest.walk import children, is_leaf, leaves, postorder
 from scenicq.limits import LIMITS
 from scenicq.temporal.grouping import alike
@@ -278,6 +278,8 @@ class AtomColumns:
 
     def _definition(self, feature: Feature) -> Node | None:
         if is_moving(feature.property) or self._feature(feature) is not None:
+            return None
+        if is_only_observed(self.scenario, feature.object, feature.property):
             return None
         return self.scenario.every_object[feature.object].properties[feature.property].value
 

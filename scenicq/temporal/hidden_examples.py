@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.budget import limited, look
+from scenicq.errors import CannotEvaluate
 from scenicq.forest.build import constant
-from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.draws import draw_leaf
 from scenicq.forest.evaluate import evaluate_all
 from scenicq.forest.kinds import kind_of

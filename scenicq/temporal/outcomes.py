@@ -17,6 +17,7 @@ from scenicq.forest.nodes import Constant, DirectionAt, Feature, Identity, Index
 from scenicq.forest.scenario import Requirement, Scenario
 from scenicq.forest.simplify import rebuilt, roots_of
 from scenicq.forest.temporal import Atom, TemporalRequirement
+from scenicq.forest.unobserved import is_only_observed
 from scenicq.forest.walk import children, deciding_first, features, leaves, postorder, transform
 from scenicq.geometry.occupancy import ElementAtPoint
 from scenicq.limits import LIMITS
@@ -72,7 +73,7 @@ def place_of(leaf: Leaf) -> str:
 
 def steady_value(scenario: Scenario, feature: Feature) -> Node | None:
     """What the program says of a property that does not change, should no label tell."""
-    if is_moving(feature.property):
+    if is_moving(feature.property) or is_only_observed(scenario, feature.object, feature.property):
         return None
     return scenario.every_object[feature.object].properties[feature.property].value
 

@@ -15,6 +15,7 @@ from scenicq.forest.among import LabelElements
 from scenicq.forest.columns import DEFINED, UNKNOWN, Column, column_of
 from scenicq.forest.ego_frame import PLACE
 from scenicq.forest.nodes import CLOCK, COURSE, GOING, LAST_LANE, PAST, RANK, TRACK, WHO, LaneCourse, Value
+from scenicq.number_ranges import expand_ranges
 from scenicq.store.classes import Granularity, class_truth
 from scenicq.store.reader import LAST
 from scenicq.store.track_block import TrackBlock
@@ -163,9 +164,8 @@ def label_elements(block: TrackBlock, labels: NDArray[np.int64], classes: Granul
         classes: How classes are compared.
     """
     counts = np.where(labels >= 0, np.diff(block.object_starts)[labels], 0)
-    ends = np.cumsum(counts)
     place = np.repeat(np.arange(len(labels)), counts)
-    objects = np.arange(int(counts.sum())) - np.repeat(ends - counts - block.object_starts[labels], counts)
+    objects = expand_ranges(block.object_starts[labels], counts)
     egos = np.where(labels >= 0, block.present_ego(labels), -1)
     with_ego = np.flatnonzero(egos >= 0)
     members = np.concatenate((objects, egos[with_ego]))

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.budget import look
-from scenicq.forest.compute import CannotEvaluate
+from scenicq.errors import CannotEvaluate
 from scenicq.forest.groups import PARAMS, Condition
 from scenicq.forest.nodes import Value
 from scenicq.forest.scenario import Requirement
@@ -30,6 +30,7 @@ from scenicq.match.problem.preprocess import ready
 from scenicq.match.problem.symmetry import classes_of_twins
 from scenicq.match.search.group_plan import MatchPlan
 from scenicq.match.search.plan_cache import PlanCache
+from scenicq.number_ranges import expand_ranges
 from scenicq.store.track_block import TrackBlock
 from scenicq.temporal.atoms import AtomColumns
 from scenicq.temporal.outcomes import Outcome
@@ -278,9 +279,7 @@ class StartSearch:
             sizes = np.bincount(of_label[chosen], minlength=len(candidates.labels))
             firsts = np.cumsum(sizes) - sizes
             repeats = sizes[where]
-            ends = np.cumsum(repeats)
-            inside = np.arange(int(repeats.sum())) - np.repeat(ends - repeats, repeats)
-            picked = candidates.members[chosen[np.repeat(firsts[where], repeats) + inside]]
+            picked = candidates.members[chosen[expand_ranges(firsts[where], repeats)]]
             members = {other: np.repeat(mine, repeats) for other, mine in members.items()}
             where = np.repeat(where, repeats)
             distinct = np.ones(len(where), np.bool_)

@@ -15,8 +15,10 @@ import pytest
 
 import scenicq
 from scenicq.errors import ScenicqError
+from scenicq.evaluate.evaluation_options import EVALUATION_OPTIONS
 from scenicq.option_values import Amount, Count, Flag, OneOf, OptionKind, Text, read_option
-from scenicq.query.execution.option_texts import KINDS
+from scenicq.query.execution.option_texts import QUERY_OPTIONS, read_options
+from scenicq.query.execution.run import QueryOptions
 from scenicq_cli.main import COMMANDS, cli
 from scenicq_cli.manual import variable_of
 from scenicq_cli.option_type import OptionType
@@ -31,7 +33,7 @@ NEEDED = {"predictions": "missing.json"}
 FITTING = {
     "shard": "1/2", "engine": "dask", "export": "paths out", "enforce": "none", "waive": "collision", "sensors": ".",
     "maps": "a.geojson", "params": "weather rain", "drawing": "modes.svg",
-    "tolerance": "0.3", "margin": "0.1", "distance": "1", "program": "ego = new Car", "format_": "nuscenes",
+    "tolerance": "0.3", "margin": "0.1", "distance_m": "1", "program": "ego = new Car", "format_": "nuscenes",
 }  # fmt: skip
 """Values of options whose kind is not told by their type."""
 
@@ -143,12 +145,36 @@ class Odd:
     """A value of no kind."""
 
 
+@pytest.mark.parametrize(
+    ("command", "declared"), [("match", QUERY_OPTIONS), ("evaluate", EVALUATION_OPTIONS)], ids=["match", "evaluate"]
+)
+def test_what_is_declared_is_an_option_of_the_command_with_its_words(command, declared):
+    found = {each.name: each for _, mine, each in options() if mine.name == command}
+    for name, option in declared.items():
+        if not option.help:
+            assert name not in found
+            continue
+        assert found[name].help == option.help
+        assert set(option.flags or (f"--{name.replace('_', '-')}",)) <= set(found[name].opts)
+        if option.default is not None:  # what the help says is what Python takes where nothing is said
+            assert found[name].default == option.default
+            option.kind.read(option.default)
+
+
+def test_the_defaults_of_the_command_are_those_of_python():
+    command = cli.get_command(click.Context(cli), "match")
+    texts = {each.name: each.default for each in command.params if each.name in QUERY_OPTIONS}
+    texts = {name: value for name, value in texts.items() if value not in (None, ()) and not callable(value)}
+    assert len(texts) > 10
+    assert read_options(**texts) == read_options() == QueryOptions()
+
+
 BAD_VALUES: list[Any] = [
     None, Odd(), [], {}, b"5", object, math.nan, math.inf, -math.inf, 1e308, -1, -1.0, 10**40, "nan", "bogus", "", (1,),
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("name", "kind"), KINDS.items())
+@pytest.mark.parametrize(("name", "kind"), [(name, each.kind) for name, each in QUERY_OPTIONS.items()])
 @pytest.mark.one_in(3)
 def test_python_refuses_what_the_command_refuses(
     name: str, kind: OptionKind, crossroads, scenarios, tmp_path, monkeypatch

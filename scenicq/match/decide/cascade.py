@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from scenicq.budget import Exhausted, look
+from scenicq.errors import CannotEvaluate
 from scenicq.forest.groups import Comparison, Constraint
 from scenicq.forest.nodes import (
     Constant,
@@ -20,7 +21,6 @@ from scenicq.forest.walk import deciding_first, leaves
 from scenicq.limits import LIMITS, exhausted
 from scenicq.match.linear.affine_forms import affine_scalar, affine_vector
 from scenicq.match.linear.affine_reach import Reach, reach_heading, reach_number, reach_position
-from scenicq.match.linear.linear_program import NotLinear
 from scenicq.match.linear.linear_relaxation import solve_affine
 from scenicq.match.problem.conditioned import Item, conditioned, options_of
 from scenicq.match.problem.evaluation import ground_cause, holds, replay
@@ -127,7 +127,7 @@ class _Cascade:
             raise exhausted("cascade_programs")
         try:
             found = solve_affine(items, [], self.tolerance)
-        except NotLinear:
+        except CannotEvaluate:
             return Undecided(constraint, "nonlinear")
         if found is None:
             return Refuted(constraint)

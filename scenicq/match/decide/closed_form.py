@@ -15,7 +15,7 @@ from typing import NamedTuple, TypeAlias, cast
 
 import numpy as np
 
-from scenicq.forest.compute import CannotEvaluate
+from scenicq.errors import CannotEvaluate
 from scenicq.forest.groups import Comparison, Condition
 from scenicq.forest.nodes import Identity, Value
 from scenicq.geometry.regions import Region

@@ -9,7 +9,7 @@ from typing import NamedTuple, cast
 
 import numpy as np
 
-from scenicq.forest.compute import CannotEvaluate
+from scenicq.errors import CannotEvaluate
 from scenicq.forest.groups import Comparison
 from scenicq.forest.nodes import Constant, DirectionAt, Feature, Identity, Index, Node, Select, Value
 from scenicq.forest.walk import postorder

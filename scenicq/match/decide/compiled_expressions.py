@@ -10,7 +10,8 @@ from typing import cast
 
 import numpy as np
 
-from scenicq.forest.compute import CannotEvaluate, compute
+from scenicq.errors import CannotEvaluate
+from scenicq.forest.compute import compute
 from scenicq.forest.groups import PARAMS
 from scenicq.forest.kinds import as_kind
 from scenicq.forest.nodes import (

@@ -88,7 +88,7 @@ def chooses_apart(items: Sequence[Item]) -> bool:
     used = {id(item): {leaf.identity: leaf for leaf in leaves(item[1])} for item in left}
     counts = [len(leaf.weights) for each in used.values() for leaf in each.values() if isinstance(leaf, Index)]
     few = bool(counts) and max(counts) <= _FEW_OPTIONS
-    return few and uses_far_field(left) and _shared(left, used) is not None
+    return few and uses_far_field(left) > 0 and _shared(left, used) is not None
 
 
 def _all(parts: Sequence[list[Item]], items: list[Item], tolerance: Tolerance, known: KnownCases | None) -> SearchSteps:

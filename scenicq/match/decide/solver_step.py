@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Protocol
 
 from scenicq.budget import waiting
+from scenicq.errors import CannotEvaluate
 from scenicq.forest.groups import Comparison, Constraint
 from scenicq.forest.nodes import Constant, Identity, Leaf, Node, Value
 from scenicq.forest.walk import deciding_first
@@ -46,7 +47,7 @@ def encoded(items: Sequence[Sequence[Item]], options: MatchOptions, *, borders: 
         borders: As of `encode`.
 
     Raises:
-        UnsupportedError: A construct has no formula.
+        CannotEvaluate: A construct has no formula.
     """
     from scenicq.smt.encode import encode  # noqa: PLC0415 - takes long to load
 
@@ -120,11 +121,10 @@ def _ask_once(items: Sequence[Sequence[Item]], options: MatchOptions, solver: So
     from scenicq.match.fields.field_solver import repaired  # noqa: PLC0415 - these take long to load
     from scenicq.smt.answer import NoAnswer, Sat, Unsat  # noqa: PLC0415
     from scenicq.smt.case_split import check_by_cases  # noqa: PLC0415
-    from scenicq.smt.encode import UnsupportedError  # noqa: PLC0415
 
     try:
         encoding = encoded(items, options, borders=False)
-    except UnsupportedError as error:
+    except CannotEvaluate as error:
         return Undecided(blame, f"unsupported: {error}")
     precision = options.precision
     for attempt in range(LIMITS.solver_attempts):

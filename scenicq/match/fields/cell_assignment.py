@@ -13,6 +13,7 @@ from typing import cast
 
 import numpy as np
 
+from scenicq.errors import CannotEvaluate
 from scenicq.forest.bounds import FloatInterval
 from scenicq.forest.condition import condition
 from scenicq.forest.groups import Comparison
@@ -24,7 +25,7 @@ from scenicq.geometry.road_direction import RoadDirection
 from scenicq.geometry.shapes import Bounds
 from scenicq.match.fields.contractor import BoxSet
 from scenicq.match.linear.affine_forms import Affine, AffineVector, affine_scalar, affine_vector
-from scenicq.match.linear.linear_program import NotLinear, Row
+from scenicq.match.linear.linear_program import Row
 from scenicq.match.linear.linear_relaxation import extent_affine, solve_affine
 from scenicq.match.linear.region_rows import Alternative, polygon_rows
 from scenicq.match.problem.conditioned import Item, conditioned
@@ -89,7 +90,7 @@ def solved(
             found = solve_affine(
                 way.items, [*fixed, *_rows(way, strict=strict)], tolerance, way.places, _options(way, strict=strict)
             )
-        except NotLinear:
+        except CannotEvaluate:
             return open_ended
         if found is None:
             return Refuted(items[0][0]) if way.exact and not strict else open_ended
@@ -110,7 +111,7 @@ def extent(
     rows = [Row(Affine(0.0, {(number, 0): 1.0}), *limits), *_rows(way, strict=False)]
     try:
         return extent_affine(way.items, rows, tolerance, way.places, _options(way, strict=False), number)
-    except NotLinear:
+    except CannotEvaluate:
         return limits
 
 

@@ -11,10 +11,10 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from scenicq.errors import CannotEvaluate
 from scenicq.forest.nodes import Constant, Contains, DiscAt, Encloses, Intersects, Node, RectangleAt, SectorAt
 from scenicq.geometry.membership import bounds, distance_many, may_be_within
 from scenicq.geometry.regions import Region
-from scenicq.geometry.terms import UndecidedError
 from scenicq.match.fields import interval_domain as domain
 from scenicq.match.fields.interval_domain import Enclosure
 from scenicq.match.tolerance import SLACK
@@ -42,7 +42,7 @@ def distance_between(region: Node, place: Enclosure) -> Enclosure:
     near = np.nonzero(np.isfinite(reach))[0]
     try:
         away = distance_many(known, middle[:, near].T)
-    except UndecidedError:
+    except CannotEvaluate:
         return found
     found[:, near] = np.stack([np.maximum(away - reach[near] - SLACK, 0.0), away + reach[near] + SLACK])
     # nothing is known of how far anything is from nothing

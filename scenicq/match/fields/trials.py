@@ -11,16 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.budget import look
+from scenicq.errors import CannotEvaluate
 from scenicq.forest.column_domain import ColumnDomain
-from scenicq.forest.columns import UNDEFINED, Column
-from scenicq.forest.compute import CannotEvaluate
-from scenicq.forest.interpret import OnMap, interpret, steps_of
+from scenicq.forest.columns import DEFINED, UNDEFINED, Column
+from scenicq.forest.interpret import OnMap, Steps, interpret, steps_of
 from scenicq.forest.nodes import Constant, DirectionAt, Feature, Identity, Index, Leaf, Node, Select
 from scenicq.forest.walk import children
 from scenicq.limits import LIMITS
 from scenicq.match.fields.contractor import BoxSet
 from scenicq.match.fields.hidden_values import HiddenValue
 from scenicq.match.fields.residuals import Residuals, residuals_of
+from scenicq.match.fields.steps_back import steps_back
 
 __all__ = ["Trial", "TrialDraws", "TrialSpace"]
 
@@ -107,6 +108,7 @@ class TrialSpace:
         low, high: Ends of all coordinates, (k, 1).
         moving, whole: Which coordinates are numbers of any kind, and which whole ones.
         fields: The uses of fields.
+        ways_back: How hidden points follow from what is observed.
     """
 
     def __init__(self, start: BoxSet) -> None:
@@ -126,6 +128,7 @@ class TrialSpace:
         self.whole = np.array([row for row, is_whole in rows if is_whole], dtype=np.intp)
         self._steps = steps_of(*(node for _, node, _ in network.items))
         self.fields = [node for node, _ in self._steps if isinstance(node, DirectionAt)]
+        self.ways_back = steps_back(network.items, self._steps) if self.fields else []
         self._use = {id(node): number for number, node in enumerate(self.fields)}
         self._only_below: dict[int, list[tuple[int, int]]] = {}
         for select in [node for node, _ in self._steps if isinstance(node, Select) and self.fields]:
@@ -151,8 +154,34 @@ class TrialSpace:
                 todo += below
         return [node for node in self._use if node not in seen]
 
-    def run(self, draws: TrialDraws) -> Trial:
+    def run(self, draws: TrialDraws, headings: _Numbers | None = None) -> Trial:
         """What draws come out as; their coordinates are cut to their ends.
+
+        Args:
+            draws: The draws.
+            headings: Where each use of a field points, (uses, n); None to ask the fields.
+
+        Raises:
+            CannotEvaluate: Geometry cannot tell.
+        """
+        count = draws.places.shape[1]
+        known = self.values(self._steps, draws, None if headings is None else self._pointing(headings))
+        with np.errstate(all="ignore"):
+            residuals = residuals_of(self.network.items, known, self.network.tolerance, count)
+        pointing = [np.broadcast_to(cast(_Numbers, known[id(node)].data), (count,)) for node in self.fields]
+        return Trial(draws, residuals, np.stack([np.empty(count), *pointing])[1:])
+
+    def use_of(self, node: DirectionAt) -> int:
+        """The number of a field's use among all."""
+        return self._use[id(node)]
+
+    def values(self, steps: Steps, draws: TrialDraws, given: Mapping[int, Column] | None = None) -> dict[int, Column]:
+        """What expressions come out as, by their ids; coordinates are cut to their ends.
+
+        Args:
+            steps: Those of the expressions.
+            draws: The draws.
+            given: Values of some nodes, by their ids.
 
         Raises:
             CannotEvaluate: Geometry cannot tell.
@@ -177,12 +206,17 @@ class TrialSpace:
         def pick(node: DirectionAt, counts: NDArray[np.intp]) -> NDArray[np.intp]:
             return (draws.shares[self._use[id(node)]] * counts).astype(np.intp)
 
+        domain = _Lazy(observed, drawn, pick, LIMITS.witness_places, wanted=self._wanted(draws.places))
         with np.errstate(all="ignore"):
-            domain = _Lazy(observed, drawn, pick, LIMITS.witness_places, wanted=self._wanted(draws.places))
-            known = interpret(self._steps, domain)
-            residuals = residuals_of(self.network.items, known, self.network.tolerance, count)
-        headings = [np.broadcast_to(cast(_Numbers, known[id(node)].data), (count,)) for node in self.fields]
-        return Trial(draws, residuals, np.stack([np.empty(count), *headings])[1:])
+            return interpret(steps, domain, given)
+
+    def _pointing(self, headings: _Numbers) -> dict[int, Column]:
+        """The uses of fields, by their ids, as they point."""
+        lost = np.isnan(headings)
+        return {
+            id(node): Column(headings[number], np.where(lost[number], UNDEFINED, DEFINED))
+            for number, node in enumerate(self.fields)
+        }
 
     def _wanted(self, places: _Numbers) -> dict[int, NDArray[np.bool_]]:
         """In which draws a field is asked for, (n,), by the id of its use, where choices leave it out in some."""

@@ -18,12 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.budget import Exhausted, Trials, trials_left
-from scenicq.forest.compute import CannotEvaluate
+from scenicq.errors import CannotEvaluate
 from scenicq.forest.nodes import Identity, Index, Leaf, PointIn, Value
 from scenicq.limits import LIMITS, exhausted
 from scenicq.match.fields.constraint_network import ConstraintNetwork
 from scenicq.match.fields.contractor import BoxSet
 from scenicq.match.fields.damped_steps import damped_steps
+from scenicq.match.fields.steps_back import draw_back
 from scenicq.match.fields.trials import Trial, TrialDraws, TrialSpace
 from scenicq.match.problem.conditioned import Item
 from scenicq.match.problem.evaluation import replay
@@ -144,6 +145,11 @@ class _Search:
         for number in range(1, self.effort.rounds + 1):
             tried = self._try(draws)
             found = self._witness(tried)
+            if found is None and self.space.fields and len(self.space.moving):
+                # how good a draw is shows where it leads
+                led = self._try(self._led(tried))
+                found = self._witness(led)
+                tried = tried.beside(led)
             best = self._best(tried)
             if found is not None or best is None:
                 return found
@@ -191,6 +197,7 @@ class _Search:
         shares[:, 1::4] *= self.rng.random(shares[:, 1::4].shape) < _OTHER
         draws = TrialDraws(np.concatenate([np.empty((0, count)), *parts]), shares)
         self._choose(draws.places, np.arange(count))
+        draw_back(self.space.ways_back, self.space, draws, self.rng)
         return draws
 
     def _choose(self, places: _Numbers, some: NDArray[np.intp]) -> None:
@@ -274,6 +281,14 @@ class _Search:
 
     # --- descent
 
+    def _led(self, tried: Trial) -> TrialDraws:
+        """Each draw after one step towards what is observed."""
+        each = np.where(np.isfinite(tried.residuals.each), tried.residuals.each, 0.0)
+        step = damped_steps(self._slopes(tried), each, self._at_ends(tried.draws.places))[0]
+        led = tried.draws.take(np.arange(tried.draws.places.shape[1]))
+        led.places[self.space.moving] += step
+        return led
+
     def _descended(self, tried: Trial) -> Trial:
         """Each draw after the best of some damped steps, also where that is worse: fields point elsewhere there."""
         rows = cast(_Indices, np.arange(tried.draws.places.shape[1]))
@@ -295,7 +310,9 @@ class _Search:
         step = np.where(places[moving] + _STEP > self.space.high[moving], -_STEP, _STEP)
         for number, row in enumerate(moving.tolist()):
             many.places[row, number * count : (number + 1) * count] += step[number]
-        after = self._try(many).residuals.each.reshape(-1, len(moving), count)
+        # so little changes no field's heading: none is asked again
+        after = self.space.run(many, np.tile(tried.headings, len(moving))).residuals.each
+        after = after.reshape(-1, len(moving), count)
         slopes = (after - tried.residuals.each[:, None]) / step
         return np.where(np.isfinite(slopes) & (np.abs(slopes) < _JUMP), slopes, 0.0).transpose(2, 0, 1)
 

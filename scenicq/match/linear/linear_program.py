@@ -9,14 +9,16 @@ from functools import cache
 from importlib import import_module
 from typing import Any
 
+from scenicq.errors import CannotEvaluate
 from scenicq.match.linear.affine_forms import Affine, VariableAxis
 from scenicq.processes import discard_output
 
-__all__ = ["LinearSystem", "NotLinear", "Row"]
+__all__ = ["LinearSystem", "Row", "not_linear"]
 
 
-class NotLinear(Exception):
-    """Constraints are not affine, or linear programs do not tell."""
+def not_linear() -> CannotEvaluate:
+    """What is raised where constraints are not affine, or linear programs do not tell."""
+    return CannotEvaluate("what linear programs do not tell")
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +54,7 @@ class LinearSystem:
         feasibility tolerance of the linear program, 1e-9.
 
         Raises:
-            NotLinear: The solver came to no answer.
+            CannotEvaluate: The solver came to no answer.
         """
         rows = [*self.rows, *more]
         if not _settled(rows):
@@ -69,7 +71,7 @@ class LinearSystem:
         Strict rows may hold with equality.
 
         Raises:
-            NotLinear: The solver came to no answer, or nothing bounds the variable.
+            CannotEvaluate: The solver came to no answer, or nothing bounds the variable.
         """
         rows = [replace(row, strict=False) if row.strict else row for row in (*self.rows, *more)]
         if not _settled(rows):
@@ -77,7 +79,7 @@ class LinearSystem:
         rows = [row for row in rows if row.form.terms]
         variables = list({each: None for row in rows for each in row.form.terms})
         if variable not in variables:
-            raise NotLinear
+            raise not_linear()
         least = _solve(rows, variables, (variable, 1.0))
         most = None if least is None else _solve(rows, variables, (variable, -1.0))
         return None if least is None or most is None else (least[variable], most[variable])
@@ -155,7 +157,7 @@ def _solve(
     if status == highs.HighsModelStatus.kInfeasible:
         return None
     if status != highs.HighsModelStatus.kOptimal:
-        raise NotLinear
+        raise not_linear()
     found = list(solver.getSolution().col_value)
     if strict and found[margin] <= _MARGIN:
         return None

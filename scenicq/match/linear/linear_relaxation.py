@@ -39,7 +39,7 @@ from scenicq.geometry.regions import (
 from scenicq.limits import LIMITS
 from scenicq.match.linear.affine_forms import Affine, AffineVector, VariableAxis, affine_scalar, affine_vector
 from scenicq.match.linear.affine_reach import ends
-from scenicq.match.linear.linear_program import LinearSystem, NotLinear, Row
+from scenicq.match.linear.linear_program import LinearSystem, Row, not_linear
 from scenicq.match.linear.region_rows import Alternative, disc_rows, region_rows, sector_rows
 from scenicq.match.problem.conditioned import Item
 from scenicq.match.tolerance import ROUNDING, SLACK, Tolerance
@@ -101,7 +101,7 @@ def solve_affine(
         alternatives: Of each, one set of facts holds.
 
     Raises:
-        NotLinear: Something is not affine, or lies between the inner and the outer polygons.
+        CannotEvaluate: Something is not affine, or lies between the inner and the outer polygons.
     """
     problem, variables = _problem(items, rows, tolerance, places, alternatives)
     found = problem.solve()
@@ -171,7 +171,7 @@ class _Problem:
     def _add_vector(self, constraint: Comparison, node: Node, observed: tuple[float, float]) -> None:
         form = affine_vector(node)
         if form is None:
-            raise NotLinear
+            raise not_linear()
         x, y = (part.plus(Affine(value, {}), -1.0) for part, value in zip(form, observed, strict=True))
         margin = self.tolerance.of(constraint.object, constraint.property)
         if margin.kind == "box":
@@ -182,7 +182,7 @@ class _Problem:
     def _add_number(self, constraint: Comparison, node: Node, observed: Value) -> None:
         form = affine_scalar(node)
         if form is None or not isinstance(observed, float):
-            raise NotLinear
+            raise not_linear()
         off = form.plus(Affine(observed, {}), -1.0)
         margin = self.tolerance.of(constraint.object, constraint.property)
         allowed = margin.size
@@ -191,7 +191,7 @@ class _Problem:
             return
         low, high = scalar_bounds(node)
         if not (math.isfinite(low) and math.isfinite(high)):
-            raise NotLinear
+            raise not_linear()
         first = math.ceil((low - observed - allowed) / math.tau - ROUNDING)
         last = math.floor((high - observed + allowed) / math.tau + ROUNDING)
         turns = range(first, last + 1)
@@ -202,7 +202,7 @@ class _Problem:
             case Contains() if isinstance(node.region, Constant):
                 place = affine_vector(node.point)
                 if place is None:
-                    raise NotLinear
+                    raise not_linear()
                 self._add_place(cast(Region, node.region.value), place, None)
             case Compare(CompareOp.LT | CompareOp.LE, Norm() as norm, Constant(value=float() as radius)) | Compare(
                 CompareOp.GT | CompareOp.GE, Constant(value=float() as radius), Norm() as norm
@@ -211,7 +211,7 @@ class _Problem:
             case Compare() if node.op not in (CompareOp.EQ, CompareOp.NE):
                 left, right = affine_scalar(node.left), affine_scalar(node.right)
                 if left is None or right is None:
-                    raise NotLinear
+                    raise not_linear()
                 below = node.op in (CompareOp.LT, CompareOp.LE)
                 limits = (-math.inf, 0.0) if below else (0.0, math.inf)
                 strict = node.op in (CompareOp.LT, CompareOp.GT)
@@ -219,19 +219,19 @@ class _Problem:
             case Constant() if node.value is True:
                 pass
             case _:
-                raise NotLinear
+                raise not_linear()
 
     def add_leaf(self, leaf: Leaf) -> None:
         """Keep a random variable in its support."""
         if isinstance(leaf, PointIn):
             if not isinstance(leaf.region, Constant):
-                raise NotLinear
+                raise not_linear()
             x, y = (Affine(0.0, {(leaf.identity, axis): 1.0}) for axis in (0, 1))
             self._add_place(cast(Region, leaf.region.value), (x, y), self.boxes.get(leaf.identity))
             return
         limits = ends(leaf)
         if limits is None:
-            raise NotLinear
+            raise not_linear()
         self.system.rows.append(Row(Affine(0.0, {(leaf.identity, 0): 1.0}), *limits))
 
     def _add_place(self, region: Region, place: AffineVector, box: Box | None) -> None:
@@ -239,7 +239,7 @@ class _Problem:
         met = region.parts if isinstance(region, IntersectionOf) else (region,)
         others = [part for part in met if not isinstance(part, Disc | Sector)]
         if len(others) > 1:
-            raise NotLinear
+            raise not_linear()
         x, y = place
         for part in met:
             if isinstance(part, Disc | Sector):
@@ -262,14 +262,14 @@ class _Problem:
         if found is not None and self.discs:
             found = _search(self.system, ordered, [*disc_rows(self.discs, outer=False)])
             if found is None:
-                raise NotLinear
+                raise not_linear()
         return found
 
     def extent(self, variable: VariableAxis) -> tuple[float, float] | None:
         """The ends of a variable over all solutions, discs taken too large."""
         around = [*disc_rows(self.discs, outer=True)]
         if math.prod(map(len, self.alternatives)) > LIMITS.extent_combinations:
-            raise NotLinear
+            raise not_linear()
         found: tuple[float, float] | None = None
         for chosen in itertools.product(*self.alternatives):
             own = self.system.extent([*around, *itertools.chain.from_iterable(chosen)], variable)

@@ -14,7 +14,7 @@ from scenicq.geometry.membership import parts_near
 from scenicq.geometry.regions import PointSet, PolygonSet, PolylineSet, Rectangle, Region, Sector, UnionOf
 from scenicq.limits import LIMITS
 from scenicq.match.linear.affine_forms import Affine, AffineVector
-from scenicq.match.linear.linear_program import NotLinear, Row
+from scenicq.match.linear.linear_program import Row, not_linear
 
 __all__ = ["Alternative", "disc_rows", "polygon_rows", "region_rows", "sector_rows"]
 
@@ -69,7 +69,7 @@ def region_rows(region: Region, limits: tuple[float, float, float, float], place
         place: The point that is in the region.
 
     Raises:
-        NotLinear: The region has too many pieces there, or none that are convex.
+        CannotEvaluate: The region has too many pieces there, or none that are convex.
     """
     x, y = place
     found: Alternative = []
@@ -85,9 +85,9 @@ def region_rows(region: Region, limits: tuple[float, float, float, float], place
                 for px, py in shapely.get_coordinates(part.near(limits)).tolist():
                     found.append([Row(x, px, px), Row(y, py, py)])
             case _:
-                raise NotLinear
+                raise not_linear()
         if len(found) > LIMITS.linear_cells:
-            raise NotLinear
+            raise not_linear()
     return found
 
 

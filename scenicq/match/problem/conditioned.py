@@ -53,11 +53,11 @@ def uses_field(items: Iterable[Item]) -> bool:
     return any(isinstance(node, DirectionAt) for node in postorder([node for _, node, _ in items]))
 
 
-def uses_far_field(items: Sequence[Item]) -> bool:
-    """Whether they ask a vector field at a point that no label observes, so that much of the map may count."""
+def uses_far_field(items: Sequence[Item]) -> int:
+    """How often they ask a vector field at a point that no label observes, so that much of the map may count."""
     seen = {id(node) for constraint, node, _ in items if getattr(constraint, "property", "") == "position"}
     fields = [node for node in postorder([node for _, node, _ in items]) if isinstance(node, DirectionAt)]
-    return any(not isinstance(node.point, Constant) and id(node.point) not in seen for node in fields)
+    return sum(not isinstance(node.point, Constant) and id(node.point) not in seen for node in fields)
 
 
 @dataclass(eq=False, slots=True)

@@ -16,7 +16,7 @@ from scenicq.forest.condition import expand
 from scenicq.forest.groups import PARAMS, Comparison, Condition, Constraint, Group, group_constraints
 from scenicq.forest.nodes import COURSE, GOING, LAST_LANE, WHO, Among, Feature, Node
 from scenicq.forest.scenario import BuiltIn, Requirement, Scenario, ScenarioObject
-from scenicq.forest.unobserved import MOTION, certain_and_possible, is_open, with_any_value
+from scenicq.forest.unobserved import certain_and_possible, is_only_observed, is_open, with_any_value
 from scenicq.forest.walk import features, postorder
 from scenicq.match.options import MatchOptions
 
@@ -52,12 +52,14 @@ def relevant_properties(scenario: Scenario, options: MatchOptions) -> tuple[froz
 def _definition(scenario: Scenario, signature: Signature, feature: Feature, *, noisy: bool = False) -> Node | None:
     """The expression of a feature that is not observed (or, unless `noisy`, whose observed value has noise added).
 
-    None for one that is, and for how an object moves, which is only ever observed.
+    None for one that is, and for what is only ever observed.
     """
     owner = scenario.objects[feature.object]
     said = "heading" if feature.property in (GOING, LAST_LANE) else feature.property
     hidden = said in owner.mutated and not noisy
-    if feature.property in (*MOTION, *WHO) or (feature.property in signature[feature.object] and not hidden):
+    if feature.property in WHO or (feature.property in signature[feature.object] and not hidden):
+        return None
+    if is_only_observed(scenario, feature.object, feature.property):
         return None
     return owner.properties[feature.property].value
 
@@ -110,7 +112,8 @@ def build_groups(scenario: Scenario, signature: Signature, options: MatchOptions
     def unobserved(feature: Feature | Among) -> bool:
         if isinstance(feature, Among):
             return False
-        return feature.property in MOTION and feature.property not in signature[feature.object]
+        only = is_only_observed(scenario, feature.object, feature.property)
+        return only and feature.property not in signature[feature.object]
 
     return tuple(_with_doubts(group, unobserved) for group in group_constraints(found))
 
@@ -151,7 +154,7 @@ def unobserved_motion(scenario: Scenario, seen: Mapping[int, Container[str]], co
     names = [
         f"{scenario.objects[index].name}.{name}"
         for index, name in read
-        if name in MOTION and index in seen and name not in seen[index]
+        if index in seen and name not in seen[index] and is_only_observed(scenario, index, name)
     ]
     if names:
         return f"{' and '.join(names)} {'is' if len(names) == 1 else 'are'} not observed"

@@ -6,8 +6,8 @@ import math
 from collections.abc import Callable, Mapping
 from typing import cast
 
+from scenicq.errors import CannotEvaluate
 from scenicq.forest.components import connected_components
-from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.evaluate import admits, evaluate_all
 from scenicq.forest.groups import Comparison, Constraint
 from scenicq.forest.nodes import Constant, DirectionAt, Identity, Index, Leaf, Node, Undefined, Value

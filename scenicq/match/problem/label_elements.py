@@ -1,8 +1,8 @@
-"""The label objects of one label as the elements that conditions on others go through, and who of them plays a role."""
+"""The label objects of labels as the elements that conditions on others go through, and who of them plays a role."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from typing import cast
 
@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.forest.among import LABEL_OBJECTS, LabelElements
-from scenicq.forest.columns import Column, column_of
+from scenicq.forest.columns import DEFINED, Column, column_of
 from scenicq.forest.nodes import IDENTITY, RANK, TRACK, Value
 from scenicq.match.problem.candidates import LabelProblem
-from scenicq.store.classes import class_truth
+from scenicq.store.classes import Granularity, class_truth
+from scenicq.store.labels import Label, LabelObject
 
-__all__ = ["who_plays"]
+__all__ = ["elements_of", "who_plays"]
 
 _WHO = (IDENTITY, TRACK)
 
@@ -39,23 +40,48 @@ def who_plays(problem: LabelProblem, assignment: Mapping[int, int]) -> dict[tupl
 
 
 def _elements(problem: LabelProblem) -> LabelElements:
-    label = problem.label
-    first = 0 if label.has_ego else 1
-    numbers = range(first, len(problem.seen))
-    objects = (label.ego, *label.objects)[first:]
-    by_id = {number: rank for rank, number in enumerate(sorted(range(len(objects)), key=lambda n: objects[n].id))}
-    ranks = np.array([by_id[number] for number in range(len(objects))], dtype=np.float64)
+    return elements_of([problem.label], lambda _, number: problem.seen[number], problem.classes)
+
+
+def elements_of(
+    labels: Sequence[Label], seen: Callable[[int, int], Mapping[str, Value]], classes: Granularity
+) -> LabelElements:
+    """The label objects of labels, a place each.
+
+    Args:
+        labels: The labels.
+        seen: What is observed of a label object, by the place of its label and its number there.
+        classes: How classes are compared.
+    """
+    firsts = [0 if label.has_ego else 1 for label in labels]
+    of_each = [(label.ego, *label.objects)[first:] for label, first in zip(labels, firsts, strict=True)]
+    counts = [len(each) for each in of_each]
+    objects = [each for mine in of_each for each in mine]
+    numbers = [first + n for first, count in zip(firsts, counts, strict=True) for n in range(count)]
+    place = np.repeat(np.arange(len(labels)), counts)
 
     @cache
     def belongs(category: str) -> NDArray[np.int8]:
-        return np.array([class_truth(category, each.category, problem.classes) for each in objects], dtype=np.int8)
+        truths = {kind: class_truth(category, kind, classes) for kind in {each.category for each in objects}}
+        return np.array([truths[each.category] for each in objects], dtype=np.int8)
 
     @cache
     def observed(name: str) -> Column:
-        if name in (RANK, *_WHO):
-            return Column(ranks if name == RANK else np.array(numbers, np.float64), np.zeros(len(objects), np.int8))
-        return column_of([problem.seen[number].get(name) for number in numbers])
+        if name in _WHO:
+            return Column(np.array(numbers, np.float64), np.full(len(objects), DEFINED))
+        if name == RANK:
+            return Column(np.concatenate([*map(_ranks, of_each), np.empty(0)]), np.full(len(objects), DEFINED))
+        if name == "position":
+            x, y = np.array([(each.x, each.y) for each in objects], dtype=np.float64).reshape(-1, 2).T
+            return Column((x, y), np.full(len(objects), DEFINED))
+        return column_of([seen(*each).get(name) for each in zip(place.tolist(), numbers, strict=True)])
 
-    return LabelElements(
-        np.zeros(len(objects), np.intp), np.ones(1, np.bool_), np.array(numbers, np.float64), belongs, observed
-    )
+    known = np.ones(len(labels), np.bool_)
+    return LabelElements(place.astype(np.intp), known, np.array(numbers, np.float64), belongs, observed)
+
+
+def _ranks(objects: Sequence[LabelObject]) -> NDArray[np.float64]:
+    """The place of each label object of a label among the ids of all."""
+    found = np.empty(len(objects))
+    found[sorted(range(len(objects)), key=lambda n: objects[n].id)] = np.arange(len(objects))
+    return found

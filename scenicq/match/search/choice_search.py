@@ -40,7 +40,10 @@ __all__ = ["AtLast", "search_choices"]
 
 
 _SEVERAL = 8
-"""Combinations of outcomes from which on a witness is looked for over all of them, even if each may be cheap."""
+"""Combinations of outcomes from which on a witness is looked for over all of them, however cheap each is."""
+
+_MANY_USES = 16
+"""Uses of fields at hidden points from which on each is costly, so that two are enough."""
 
 Decide = Callable[[list[Item]], SearchSteps]
 """Decides constraints that hold no choices."""
@@ -147,14 +150,15 @@ class _ChoiceSearch:
 
     def _search_witness(self) -> Satisfied | None:
         """A witness over all outcomes together, where fields at hidden points make each of them costly to decide."""
-        fewest = _SEVERAL if self.patience is Patience.LITTLE else 2
-        several = not self.depth and math.prod(len(domain.rows) for domain in self.domains) >= fewest
-        if not several or not uses_far_field(self.items):
+        outcomes, uses = math.prod(len(domain.rows) for domain in self.domains), uses_far_field(self.items)
+        cheap = self.patience is Patience.LITTLE and outcomes < _SEVERAL and uses < _MANY_USES
+        if self.depth or outcomes < 2 or not uses or cheap:
             return None
         from scenicq.match.fields.witness_search import AGAIN, QUICK, search_witness  # noqa: PLC0415 - takes long to load
 
-        efforts = (QUICK,) if self.patience is Patience.LITTLE else AGAIN
-        seed = len(AGAIN) * (self.patience is Patience.ALL)
+        little = (QUICK, QUICK) if uses >= _MANY_USES else (QUICK,)
+        efforts = little if self.patience is Patience.LITTLE else AGAIN
+        seed = len(AGAIN) * self.patience
         tables = [(domain.outcomes.variables, domain.outcomes.picks[domain.rows]) for domain in self.domains]
         return search_witness(self.items, self.tolerance, *efforts, outcomes=tables, seed=seed)
 

@@ -19,16 +19,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.budget import look
-from scenicq.forest.compute import CannotEvaluate
+from scenicq.errors import CannotEvaluate
+from scenicq.forest.among import LABEL_OBJECTS
 from scenicq.forest.groups import Constraint
-from scenicq.forest.nodes import COURSE, GOING, LAST_LANE, Identity, LaneCourse, Leaf, Value
+from scenicq.forest.nodes import COURSE, GOING, LAST_LANE, RANK, WHO, Identity, LaneCourse, Leaf, Value
 from scenicq.forest.scenario import Scenario
 from scenicq.limits import LIMITS
 from scenicq.match.decide.closed_form import ClosedForm, Evaluated
+from scenicq.match.decide.others_forms import others_form_of
 from scenicq.match.decide.range_forms import Columns, FloatColumn, Get
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import Candidates
 from scenicq.match.problem.constraints import Signature
+from scenicq.match.problem.label_elements import elements_of
 from scenicq.match.problem.map_lookups import MapLookups
 from scenicq.match.problem.observation import observe, observe_course, observed_names
 from scenicq.match.problem.outcome import Outcome
@@ -368,7 +371,14 @@ def _column(
         index: The object.
         name: The property.
     """
+    if (index, name) == LABEL_OBJECTS:
+        some = functools.partial(
+            elements_of, [row.label for row in rows], lambda place, number: rows[place].observed(number)
+        )
+        return cast(FloatColumn, functools.cache(some))
     rank = ranks[index]
+    if name in WHO:
+        return _who(rows, [mine[rank] for mine in numbers], name)
     playing = [(row, mine[rank]) for row, mine in zip(rows, numbers, strict=True)]
     if name == GOING:
         name = "heading"  # nan where there is none
@@ -381,6 +391,16 @@ def _column(
         x, y = np.array([(each.x, each.y) for each in objects], dtype=np.float64).reshape(-1, 2).T
         return x, y
     return np.array([getattr(each, name) for each in objects], dtype=np.float64)
+
+
+def _who(rows: Sequence[LabelRow], playing: Sequence[int], name: str) -> FloatColumn:
+    """Who plays an object, as a number; or the place of its id in its label."""
+    if name != RANK:
+        return np.array(playing, dtype=np.float64)
+    return np.array([
+        sum(each.id < _label_object(row.label, number).id for each in (row.label.ego, *row.label.objects))
+        for row, number in zip(rows, playing, strict=True)
+    ], dtype=np.float64)  # fmt: skip
 
 
 def _numeric(values: Sequence[Value]) -> FloatColumn | tuple[FloatColumn, FloatColumn]:
@@ -436,7 +456,8 @@ def _listed(values: FloatColumn | Sequence[T] | T, size: int) -> list[T]:
 
 def first_fit_of(plan: MatchPlan, scenario: Scenario) -> FirstFit | None:
     """The plan made ready; None if some group has no closed form, or there are too many."""
-    forms = [(group, group.closed_form) for group in plan.groups if group.closed_form is not None]
+    told = ((group, group.closed_form or others_form_of(group.group)) for group in plan.groups)
+    forms = [(group, form) for group, form in told if form is not None]
     if len(forms) < len(plan.groups):
         return None
     order = (scenario.ego, *(each.index for each in scenario.objects if each.index != scenario.ego))

@@ -12,8 +12,8 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from scenicq.budget import Exhausted, Trials, look
+from scenicq.errors import CannotEvaluate
 from scenicq.forest.among import asks_others
-from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.groups import PARAMS, Group
 from scenicq.forest.nodes import Among, Feature, Value
 from scenicq.forest.unobserved import certain_and_possible

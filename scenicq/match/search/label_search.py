@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from typing import TypeAlias, cast
 
 from scenicq.budget import Exhausted
-from scenicq.forest.compute import CannotEvaluate
+from scenicq.errors import CannotEvaluate
 from scenicq.forest.groups import Constraint, Group
 from scenicq.forest.scenario import Scenario
 from scenicq.limits import LIMITS

@@ -22,7 +22,7 @@ from scenicq.match.verdict import Match, Verdict
 from scenicq.query.execution.lazy_solver import LazySolver
 from scenicq.query.execution.results import Result
 from scenicq.query.prefilter.decision import decided_frames
-from scenicq.query.prefilter.executor import Block, keep_players, names, run_players, run_prefilter
+from scenicq.query.prefilter.executor import Block, keep_players, names, object_rows, run_players, run_prefilter
 from scenicq.query.prefilter.plan import LABELS, Plan, make_plan
 from scenicq.query.prefilter.survivors import Candidate, CandidateRows, candidate_rows, candidates
 from scenicq.recent import Recent
@@ -37,7 +37,7 @@ if TYPE_CHECKING:  # they take long to load, and not every query needs the last 
     from scenicq.match.problem.candidates import Candidates
     from scenicq.query.execution.own_lanes import OwnLanes
     from scenicq.query.execution.recorder import Recorder
-    from scenicq.query.execution.recording_matcher import DecidedRecordings, RecordingMatcher
+    from scenicq.query.execution.recording_matcher import DecidedRecordings, RecordingMatcher, Survivors
     from scenicq.query.execution.timelines import Timelines
     from scenicq.query.execution.variant_matcher import VariantMatcher
 
@@ -183,11 +183,6 @@ class Decider:
             decided = self._decide(block)
         if self.until is not None:
             decided = replace(decided, found=self._in_time(iter(decided.found)))
-        own_lanes = self._lanes_of(block.map) if decided.recordings is not None else None
-        if decided.recordings is not None and own_lanes is not None:
-            decided.recordings.results = [*own_lanes.at_the_start(self.dataset, decided.recordings.results)]
-        if decided.recordings is not None and self.timelines and (filler := self._timelines_of(block.map)) is not None:
-            decided.recordings.results = filler.fill(decided.recordings.results)
         recorder = self._recorder(block.map)
         if recorder is None:
             return decided
@@ -251,7 +246,6 @@ class Decider:
 
         connection, plan = self.connection, compiled.plan
         rows: CandidateRows | None = None
-        # recordings are of one map
         every = np.concatenate([np.arange(*run) for run in block.runs])
         if not plan.stages:
             missed = np.full(len(every), -1, np.int16)
@@ -262,9 +256,12 @@ class Decider:
         elif plan.players:
             missed, players = self._players(plan, block, every)
             rows = CandidateRows.of(players, len(plan.roles or ()))
+            kept: list[bool] = []
 
             def read(wanted: NDArray[np.int64]) -> Iterator[Candidate]:
-                keep_players(self.dataset, connection, plan, block, players)
+                if not kept:
+                    keep_players(self.dataset, connection, plan, block, players)
+                    kept.append(True)
                 return candidates(
                     connection, plan, motion=compiled.motion, among=wanted, recorded=self.dataset.recorded,
                     whole=compiled.whole,
@@ -283,7 +280,21 @@ class Decider:
         left = Survivors(every[missed < 0], rows, plan.roles or (), read)
         if not len(left.labels):
             return Decided(missed, [], [], DecidedRecordings.nothing(block))
-        return Decided(missed, [], [], self._recording_matcher(block.map).decide(block, left))
+        parts, found = block.by_map(), DecidedRecordings()
+        objects = object_rows(self.dataset, connection, block) if len(parts) > 1 else {}
+        for part in parts:
+            mine = left.within(part, objects.get(part.map))
+            found.add(self._on_map(part, mine) if len(mine.labels) else DecidedRecordings.nothing(part))
+        return Decided(missed, [], [], found)
+
+    def _on_map(self, block: Block, left: Survivors) -> DecidedRecordings:
+        """Decide recordings of one map, some labels of which the prefilter has left."""
+        found = self._recording_matcher(block.map).decide(block, left)
+        if (own_lanes := self._lanes_of(block.map)) is not None:
+            found.results = [*own_lanes.at_the_start(self.dataset, found.results)]
+        if self.timelines and (filler := self._timelines_of(block.map)) is not None:
+            found.results = filler.fill(found.results)
+        return found
 
     def _recorder(self, map_name: str) -> Recorder | None:
         """What works out what the program records; None where nobody reads that."""

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:  # takes long to load
     from scenicq.smt.answer import Answer, SolverSession
-    from scenicq.smt.formula import Problem
+    from scenicq.smt.problem import Problem
 
 __all__ = ["LazySolver"]
 

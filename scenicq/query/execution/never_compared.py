@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from scenicq.errors import Diagnostic, Span, similar
 from scenicq.forest.groups import PARAMS
 from scenicq.forest.scenario import Scenario
-from scenicq.forest.unobserved import MOTION
+from scenicq.forest.unobserved import is_only_observed
 from scenicq.forest.walk import features
 from scenicq.match.options import MatchOptions
 from scenicq.store.classes import ROOT, ancestors, class_matches, fold, is_class, subclasses
@@ -98,11 +98,11 @@ def _settings(scenario: Scenario, options: MatchOptions) -> Iterator[_Setting]:
         for name, span in owner.uncomparable.items():
             if name not in _NOT_SEEN:
                 yield _Setting(f"{owner.name}.{name}", name, owner.category, ego, span, comparable=False)
-    yield from _motion_read(scenario, options)
+    yield from _only_read(scenario, options)
 
 
-def _motion_read(scenario: Scenario, options: MatchOptions) -> Iterator[_Setting]:
-    """What a scenario reads of how objects move: no default stands in where labels do not tell."""
+def _only_read(scenario: Scenario, options: MatchOptions) -> Iterator[_Setting]:
+    """What a scenario reads and labels alone tell: no default stands in where they do not."""
     frame, over_time = (
         "read here: a frame that hangs on it is unknown",
         "read here: an interval that hangs on it is unknown",
@@ -118,8 +118,8 @@ def _motion_read(scenario: Scenario, options: MatchOptions) -> Iterator[_Setting
     read += [(condition, condition.span, over_time) for condition in (dynamics.conditions if dynamics else ())]
     for root, span, told in read:
         for index, name in features(root):
-            if index != PARAMS and name in MOTION:
-                owner = scenario.objects[index]
+            if index != PARAMS and is_only_observed(scenario, index, name):
+                owner = scenario.every_object[index]
                 ego = index == scenario.ego and options.ego == "label"
                 yield _Setting(f"{owner.name}.{name}", name, owner.category, ego, span, told)
 

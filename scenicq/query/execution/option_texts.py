@@ -1,123 +1,42 @@
-"""Options as people write them, such as `position=0.25,heading=5deg`, become the values that a query takes."""
+"""The options of a query, each declared once: what people write, as `position=0.25,heading=5deg`, becomes values."""
 
 from __future__ import annotations
 
 import shlex
 import shutil
 from collections.abc import Mapping
-from typing import Any, Literal, TypedDict, Unpack, get_args
+from typing import Annotated, Any, Literal, TypedDict, Unpack, get_args
 
 from scenicq.compiler.element_lookups import LaneRule
-from scenicq.compiler.temporal import REACTION_S, Behaviors
+from scenicq.compiler.temporal import Behaviors
 from scenicq.errors import DataError, Diagnostic, SolverError
 from scenicq.forest.scenario import BuiltIn
 from scenicq.match.options import MatchOptions, Method
-from scenicq.match.tolerance import parse_tolerance
+from scenicq.match.tolerance import Tolerance, parse_tolerance
 from scenicq.option_values import (
     FURTHEST_M,
     Amount,
     Count,
     Flag,
     OneOf,
-    OptionKind,
+    Option,
     Parameters,
     Text,
-    read_options_of,
+    declared_options,
+    read_values,
 )
 from scenicq.query.execution.run import QueryOptions
 from scenicq.store.classes import Granularity
-from scenicq.temporal.interval_options import DEFAULT_GAP_S, IntervalOptions, Intervals
+from scenicq.temporal.interval_options import IntervalOptions, Intervals
 
-__all__ = ["DRIVING", "KINDS", "VERSIONS", "OptionTexts", "read_built_ins", "read_options"]
+__all__ = ["DRIVING", "QUERY_OPTIONS", "OptionTexts", "read_built_ins", "read_options"]
 
 _DEFAULTS = MatchOptions()
 
 DRIVING = "scenic.domains.driving.model"
 """The world model of a program that is given as text and names none."""
 
-VERSIONS: dict[str, Literal[1, 2, 3]] = {"1": 1, "2": 2, "3": 3}
-"""The versions of Scenic by what names them."""
-
-
-class OptionTexts(TypedDict, total=False):
-    """The options of `scenicq match` that say what a match is and how it is found, by the names of the command line.
-
-    None stands for the default where the type has it. Numbers may be texts, such as `timeout="5min"`.
-    """
-
-    tolerance: str | float | None
-    classes: Granularity
-    ego: Literal["label", "any"]
-    radius: float | str | None
-    enforce: str | None
-    exact: bool
-    solver: str
-    method: Method
-    prefilter: bool
-    jobs: int | str | None
-    timeout: float | str
-    budget: int | str
-    limit: int | str | None
-    where: str | None
-    sort: str | None
-    every: bool
-    all_matches: bool
-    strict: bool
-    scenic: str | None
-    initial: bool
-    map_defaults: bool
-    lanes: LaneRule
-    ignore_params: str | None
-    behaviors: Behaviors
-    reaction: float | str
-    min_duration: float | str | None
-    intervals: Intervals
-    gap: float | str
-    model: str | None
-    run_scenario: str | None
-    params: Mapping[str, float | str] | None
-
-
-_SOLVERS = ("auto", "dreal", "portable")
-
-KINDS: Mapping[str, OptionKind] = {
-    "tolerance": Text("sizes such as position=0.25,heading=5deg, or one for all", numeric=True),
-    "classes": OneOf(get_args(Granularity)),
-    "ego": OneOf(("label", "any")),
-    "radius": Amount("m", most=FURTHEST_M, above=True),
-    "enforce": Text("names of built-in requirements, separated by commas"),
-    "exact": Flag(),
-    "solver": Text("the name of a solver"),
-    "method": OneOf(get_args(Method)),
-    "prefilter": Flag(),
-    "jobs": Count(most=4096),
-    "timeout": Amount("s", above=True),
-    "budget": Count(),
-    "limit": Count(),
-    "where": Text("a condition on what the program records"),
-    "sort": Text("the name of what the program records, with `:desc` from the greatest"),
-    "every": Flag(),
-    "all_matches": Flag(),
-    "strict": Flag(),
-    "scenic": OneOf(tuple(VERSIONS)),
-    "initial": Flag(),
-    "map_defaults": Flag(),
-    "lanes": OneOf(get_args(LaneRule)),
-    "ignore_params": Text("names of parameters, separated by commas"),
-    "behaviors": OneOf(get_args(Behaviors)),
-    "reaction": Amount("s"),
-    "min_duration": Amount("s"),
-    "intervals": OneOf(get_args(Intervals)),
-    "gap": Amount("s", above=True),
-    "model": Text("the name of a world model"),
-    "run_scenario": Text("the name of a scenario"),
-    "params": Parameters(),
-}
-"""What values the options have, by the names of the command line, for the command and for Python."""
-_OPTIONAL = frozenset({
-    "tolerance", "radius", "enforce", "jobs", "limit", "where", "sort", "scenic", "ignore_params", "min_duration",
-    "model", "run_scenario", "params",
-})  # fmt: skip
+_VERSIONS: dict[str, Literal[1, 2, 3]] = {"1": 1, "2": 2, "3": 3}
 
 
 def _names(text: str | None) -> list[str]:
@@ -148,7 +67,26 @@ def _enforced(text: str | None) -> frozenset[BuiltIn]:
     return asked if "none" in _names(text) else asked | _DEFAULTS.enforce
 
 
-def _check_solver(name: str) -> None:
+def _tolerance(text: str | None) -> Tolerance:
+    return _DEFAULTS.tolerance if text is None else parse_tolerance(text)
+
+
+def _exempt(text: str | None) -> frozenset[str]:
+    return _DEFAULTS.ignore_params.union(_names(text))
+
+
+def _version(text: str | None) -> Literal[1, 2, 3] | None:
+    return None if text is None else _VERSIONS[text]
+
+
+def _pairs(values: tuple[tuple[str, float | str], ...] | None) -> tuple[tuple[str, float | str], ...]:
+    return values or ()
+
+
+_SOLVERS = ("auto", "dreal", "portable")
+
+
+def _solver(name: str) -> str:
     """Refuse a name that nothing answers to at once, rather than at the first frame that needs the solver."""
     try:
         words = shlex.split(name)
@@ -157,6 +95,132 @@ def _check_solver(name: str) -> None:
     if name not in _SOLVERS and (not words or shutil.which(words[0]) is None):
         hint = f"known are {', '.join(_SOLVERS)}, or a command that reads SMT-LIB 2, such as 'z3 -in'"
         raise SolverError(Diagnostic("solver-missing", f"`{name}` is no solver, and no command here", hints=(hint,)))
+    return name
+
+
+_MATCH, _TIME, _HOW, _OUT = "What counts as a match", "Over time", "How it is decided", "What comes out"
+_MESSAGES = "Messages and exit code"
+
+
+# fmt: off
+class OptionTexts(TypedDict, total=False):
+    """The options of `scenicq match` that say what a match is and how it is found, in the order of its help.
+
+    None stands for the default where the type has it. Numbers may be texts, such as `timeout="5min"`.
+    """
+
+    run_scenario: Annotated[str | None, Option(
+        Text("the name of a scenario"), "NAME",
+        "Which scenario of a program with several runs.  [default: Main, or the only one]",
+        _MATCH, ("--scenario",), "label")]
+    params: Annotated[Mapping[str, float | str] | None, Option(
+        Parameters(), "NAME VALUE",
+        "Give a global parameter a value, whatever the program says: a number or a text. Can be given several times.",
+        _MATCH, ("-p", "--param"), "label", meaning=_pairs)]
+    tolerance: Annotated[str | float | None, Option(
+        Text("sizes such as position=0.25,heading=5deg, or one for all", numeric=True), "LIST",
+        "How far labels may be off, in metres, deg or rad: position=, heading=, speed= and so on; for some objects "
+        "ego.heading=15deg, Pedestrian.position=0.5; a bare size for all; or `exact`, 1e-3.  "
+        "[default: position=0.25,heading=5deg]",
+        _MATCH, about="label", field="match.tolerance", meaning=_tolerance)]
+    classes: Annotated[Granularity, Option(
+        OneOf(get_args(Granularity)), None,
+        "coarse folds all vehicles into Car and all people into Pedestrian.",
+        _MATCH, about="label", field="match.classes")]
+    ego: Annotated[Literal["label", "any"], Option(
+        OneOf(("label", "any")), None,
+        "Whether the scenario's ego is the recording vehicle, or any object of its class.",
+        _MATCH, about="label", field="match.ego")]
+    radius: Annotated[float | str | None, Option(
+        Amount("m", most=FURTHEST_M, above=True), "M",
+        "Ignore objects and map farther than this from the ego, in metres.",
+        _MATCH, about="label", field="match.radius")]
+    enforce: Annotated[str | None, Option(
+        Text("names of built-in requirements, separated by commas"), "LIST",
+        "Built-in requirements to enforce besides visibility: containment, collision; `none` switches visibility off.",
+        _MATCH, about="label", field="match.enforce", meaning=_enforced)]
+    exact: Annotated[bool, Option(
+        Flag(), None, "Every object of the frame must have a role.",
+        _MATCH, about="label", field="match.exact")]
+    solver: Annotated[str, Option(
+        Text("the name of a solver"), "NAME",
+        "auto, dreal, portable, or a command that reads SMT-LIB 2, such as 'z3 -in'.",
+        _HOW, about="label", meaning=_solver)]
+    method: Annotated[Method, Option(
+        OneOf(get_args(Method)), None,
+        "smt sends everything to the solver; monolithic as one formula. The verdicts are the same.",
+        _HOW, about="label", field="match.method")]
+    prefilter: Annotated[bool, Option(
+        Flag(), None, "Whether SQL narrows the frames first. The matches are the same.", _HOW)]
+    jobs: Annotated[int | str | None, Option(
+        Count(most=4096), "N",
+        "Processes that match.  [default: one a processor, at most 8, once it is clear that it takes long; with "
+        "--shard 1]", _HOW)]
+    timeout: Annotated[float | str, Option(
+        Amount("s", above=True), "S", "Seconds for one frame, the solver's included; then it is unknown.",
+        _HOW, about="label", field="match.timeout_s")]
+    budget: Annotated[int | str, Option(
+        Count(), "N", "Steps of the search for a correspondence in one frame; then the frame is unknown.",
+        _HOW, about="label", field="match.budget")]
+    limit: Annotated[int | str | None, Option(Count(), "N", "Stop after so many matches.", _OUT)]
+    every: Annotated[bool, Option(
+        Flag(), None, "Show frames that do not match, too, each with its cause.", _OUT, ("--all",))]
+    all_matches: Annotated[bool, Option(
+        Flag(), None,
+        "One line for each correspondence by which a frame matches, interchangeable objects in one order only.", _OUT)]
+    where: Annotated[str | None, Option(
+        Text("a condition on what the program records"), "CONDITION",
+        "Show only matches that meet a condition on what the program records (`record (distance to lead) as gap`): "
+        "'gap < 5', over time 'gap.minimum < 5'; also `and`, `or`, `not`. Where a value is null it is not known: such "
+        "matches are left out, and counted.", _OUT)]
+    sort: Annotated[str | None, Option(
+        Text("the name of what the program records, with `:desc` from the greatest"), "NAME[:desc]",
+        "Order matches by a value that the program records, the least first, those without one last; with --limit no "
+        "more than so many are kept in memory.", _OUT)]
+    scenic: Annotated[str | None, Option(
+        OneOf(tuple(_VERSIONS)), None, "Version of Scenic.  [default: inferred]",
+        _MATCH, about="label", field="version", meaning=_version)]
+    map_defaults: Annotated[bool, Option(
+        Flag(), None,
+        "Whether the world model places and turns what the program does not: a car on the road, along it. Without a "
+        "map it never does.", _MATCH, about="label")]
+    lanes: Annotated[LaneRule, Option(
+        OneOf(get_args(LaneRule)), None,
+        "Which of several lanes that contain an object are its own, as in `ego.lane`: along, those that lead within "
+        "60 degrees of its heading or go on from the last lane of its track, and all where none does or it has no "
+        "heading; any, all of them.", _MATCH, about="label")]
+    initial: Annotated[bool, Option(
+        Flag(), None, "Ignore behaviors and other dynamic parts: match the initial scene.", _MATCH, about="label")]
+    behaviors: Annotated[Behaviors, Option(
+        OneOf(get_args(Behaviors)), None,
+        "What becomes of behaviors: motion runs them and compares what they do with what is seen; guards lets every "
+        "action pass; ignore leaves them out.", _TIME, about="label")]
+    reaction: Annotated[float | str, Option(
+        Amount("s"), "S", "Seconds that an object has to do what its behavior says, at each change.",
+        _TIME, about="label", field="reaction_s")]
+    min_duration: Annotated[float | str | None, Option(
+        Amount("s"), "S",
+        "Find intervals of at least S seconds: of a program about one instant, those in which every frame matches with "
+        "the same objects.", _TIME, about="interval", field="time.min_duration_s")]
+    intervals: Annotated[Intervals, Option(
+        OneOf(get_args(Intervals)), None, "Report the longest of overlapping intervals, or all of them.",
+        _TIME, field="time.intervals")]
+    gap: Annotated[float | str, Option(
+        Amount("s", above=True), "S", "An object that has no label for longer than this is another one afterwards.",
+        _TIME, about="interval", field="time.gap_s")]
+    ignore_params: Annotated[str | None, Option(
+        Text("names of parameters, separated by commas"), "LIST", "Global parameters that are not compared.",
+        _MATCH, about="label", field="match.ignore_params", meaning=_exempt)]
+    strict: Annotated[bool, Option(
+        Flag(), None,
+        "What the program sets and no label has is an error, not a warning; so is all that `scenicq check` warns of.",
+        _MESSAGES, about="label")]
+    model: Annotated[str | None, Option(Text("the name of a world model"))]
+# fmt: on
+
+
+QUERY_OPTIONS = declared_options(OptionTexts, QueryOptions())
+"""The options of a query by name, for the command, for Python and for reports."""
 
 
 def read_options(**given: Unpack[OptionTexts]) -> QueryOptions:
@@ -169,29 +233,8 @@ def read_options(**given: Unpack[OptionTexts]) -> QueryOptions:
         DataError: option-invalid.
         SolverError: solver-missing.
     """
-    read = read_options_of(KINDS, given, _OPTIONAL)
-    tolerance, scenic = read.get("tolerance"), read.get("scenic")
-    _check_solver(read.get("solver", "auto"))
-    options = MatchOptions(
-        tolerance=_DEFAULTS.tolerance if tolerance is None else parse_tolerance(tolerance),
-        classes=read.get("classes", _DEFAULTS.classes),
-        ego=read.get("ego", _DEFAULTS.ego),
-        radius=read.get("radius"),
-        enforce=_enforced(read.get("enforce")),
-        exact=read.get("exact", _DEFAULTS.exact),
-        method=read.get("method", _DEFAULTS.method),
-        timeout_s=read.get("timeout", _DEFAULTS.timeout_s),
-        budget=read.get("budget", _DEFAULTS.budget),
-        ignore_params=_DEFAULTS.ignore_params.union(_names(read.get("ignore_params"))),
-    )
-    time = IntervalOptions(read.get("intervals", "longest"), read.get("min_duration"), read.get("gap", DEFAULT_GAP_S))
-    same = (
-        "solver", "initial", "map_defaults", "lanes", "prefilter", "jobs", "limit", "where", "sort", "every",
-        "all_matches", "strict", "model", "run_scenario",
-    )  # fmt: skip
-    values: dict[str, Any] = {name: value for name, value in read.items() if name in same}
-    version = None if scenic is None else VERSIONS[scenic]
-    return QueryOptions(
-        match=options, version=version, behaviors=read.get("behaviors", "motion"),
-        reaction_s=read.get("reaction", REACTION_S), time=time, params=read.get("params") or (), **values,
-    )  # fmt: skip
+    parts: dict[str, dict[str, Any]] = {"": {}, "match": {}, "time": {}}
+    for name, value in read_values(QUERY_OPTIONS, given).items():
+        part, _, field = QUERY_OPTIONS[name].field.rpartition(".")
+        parts[part][field] = value
+    return QueryOptions(match=MatchOptions(**parts["match"]), time=IntervalOptions(**parts["time"]), **parts[""])

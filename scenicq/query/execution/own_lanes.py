@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache, partial
 
-from scenicq.compiler.element_lookups import LOOKUPS, LookupTable
+from scenicq.compiler.element_lookups import LookupTable
 from scenicq.forest.nodes import AheadInLanes, Constant, DirectionAt, Feature, Node
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.simplify import roots_of
@@ -50,8 +50,7 @@ def _asked_by(node: Node) -> _Asked | None:
 
 @lru_cache(maxsize=16)
 def _lanes_of(network: Network) -> Occupancy:
-    family, layers = LOOKUPS["laneAt"]
-    return LookupTable("network.laneAt", family, layers(network)).occupancy
+    return LookupTable.of_network(network, "laneAt").occupancy
 
 
 @dataclass(eq=False)

@@ -16,8 +16,8 @@ from typing import cast
 import numpy as np
 
 from scenicq.budget import look
+from scenicq.errors import CannotEvaluate
 from scenicq.forest.columns import DEFINED, UNDEFINED, value_reader
-from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.kinds import kind_of
 from scenicq.forest.nodes import Kind, Node, Value
 from scenicq.forest.scenario import RecordedValue, Scenario

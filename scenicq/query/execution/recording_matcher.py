@@ -68,6 +68,12 @@ class DecidedRecordings:
         """What becomes of a block of whole recordings in which nothing starts."""
         return cls(counts=Counter(recordings=len(rows.runs)))
 
+    def add(self, other: DecidedRecordings) -> None:
+        """Take in what became of the recordings that follow."""
+        self.results += other.results
+        for mine, theirs in ((self.counts, other.counts), (self.failed, other.failed), (self.broken, other.broken)):
+            mine.update(theirs)
+
 
 @dataclass(frozen=True, slots=True)
 class Survivors:
@@ -84,6 +90,17 @@ class Survivors:
     rows: CandidateRows | None
     roles: tuple[int, ...]
     read: Callable[[NDArray[np.int64]], Iterator[Candidate]]
+
+    def within(self, rows: Block, objects: tuple[int, int] | None) -> Survivors:
+        """Those of some recordings of the block.
+
+        Args:
+            rows: The recordings.
+            objects: Where their label objects are: the first row, and that behind the last; None where nobody asks.
+        """
+        low, high = np.searchsorted(self.labels, (rows.first, rows.end)).tolist()
+        mine = self.rows if self.rows is None or objects is None else self.rows.between(*objects)
+        return Survivors(self.labels[low:high], mine, self.roles, self.read)
 
 
 @dataclass(frozen=True, slots=True)

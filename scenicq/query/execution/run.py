@@ -19,6 +19,7 @@ from scenicq.compiler.program import compile_scenario
 from scenicq.compiler.temporal import REACTION_S, Behaviors
 from scenicq.errors import DataError, Diagnostic, ScenarioError, Source
 from scenicq.forest.scenario import Scenario
+from scenicq.geometry.abstract_map import AbstractNetwork, NeedsMapError
 from scenicq.geometry.map_traits import MapTraits
 from scenicq.geometry.network import Network
 from scenicq.match.options import MatchOptions
@@ -46,6 +47,7 @@ from scenicq.query.prefilter.plan import Plan
 from scenicq.recent import Recent
 from scenicq.store.dataset import Dataset, DatasetReference
 from scenicq.store.manifest import Counts
+from scenicq.store.said_values import said_types
 from scenicq.temporal.interval_options import IntervalOptions
 
 if TYPE_CHECKING:
@@ -145,23 +147,27 @@ class _Known:
     Attributes:
         compiled: The program over maps that it has read, and one of each of those that are alike.
         recent: The program over others of these.
-        alike: The program over one of the maps with the same traits, where it asks for nothing else.
+        alike: The program over any map of the same traits, or over one of them where it asks for nothing else.
+        tried: The traits for which that was looked for over any map.
         copies: What makes the program over others of these.
         lacking: What maps lack that the program needs.
         scenarios: The program over all maps that it fits, one of those that are alike.
         extents: Where the frames of each map are.
         coverage: What is compared.
+        attributes: The types of what labels say, by the names of attributes.
         timelines: What works out what roles do, by the map; None where the program does not say.
     """
 
     compiled: dict[str, CompiledMap] = field(default_factory=dict["str", CompiledMap])
     recent: Recent[str, CompiledMap] = field(default_factory=lambda: Recent(MAPS_KEPT))
     alike: dict[MapTraits, CompiledMap] = field(default_factory=dict[MapTraits, CompiledMap])
+    tried: set[MapTraits] = field(default_factory=set[MapTraits])
     copies: dict[MapTraits, ScenarioCopies] = field(default_factory=dict[MapTraits, ScenarioCopies])
     lacking: dict[str, ScenarioError] = field(default_factory=dict["str", "ScenarioError"])
     scenarios: list[Scenario] | None = None
     extents: dict[str, list[Extent]] | None = None
     coverage: Coverage | None = None
+    attributes: Mapping[str, frozenset[type]] | None = None
     timelines: dict[str, Timelines | None] = field(default_factory=dict["str", "Timelines | None"])
 
 
@@ -201,16 +207,25 @@ class Query:
         """
         network = self.dataset.network(map_name)
         try:
-            scenario = compile_scenario(
-                self.source, network, version=self.options.version, initial=self.options.initial,
-                behaviors=self.options.behaviors, reaction_s=self.options.reaction_s, loader=self.siblings,
-                model=self.options.model, map_defaults=self.options.map_defaults, gap_s=self.options.time.gap_s,
-                lanes=self.options.lanes, scenario=self.options.run_scenario, params=dict(self.options.params),
-            )  # fmt: skip
-            check_enforced(scenario, self.options.match.enforce)
+            return self._compile_over(network), network
         except ScenarioError as error:
             raise about_dataset(error, self.dataset, map_name) from None
-        return ready(scenario), network
+
+    def _compile_over(self, network: Network) -> Scenario:
+        scenario = compile_scenario(
+            self.source, network, version=self.options.version, initial=self.options.initial,
+            behaviors=self.options.behaviors, reaction_s=self.options.reaction_s, loader=self.siblings,
+            model=self.options.model, map_defaults=self.options.map_defaults, gap_s=self.options.time.gap_s,
+            lanes=self.options.lanes, scenario=self.options.run_scenario, params=dict(self.options.params),
+            label_attributes=self._label_attributes,
+        )  # fmt: skip
+        check_enforced(scenario, self.options.match.enforce)
+        return ready(scenario)
+
+    def _label_attributes(self) -> Mapping[str, frozenset[type]]:
+        if self._known.attributes is None:
+            self._known.attributes = said_types(self.dataset)
+        return self._known.attributes
 
     def _check_ego(self) -> None:
         """Refuse to take a stand-in for an ego that the source does not have."""
@@ -234,26 +249,48 @@ class Query:
         if map_name in known.compiled:
             return known.compiled[map_name]
         compiled = known.recent.get(map_name, lambda: self._compile_map(map_name))
-        traits = self.dataset.traits(map_name) if compiled.anywhere else None
+        traits = self.dataset.traits(map_name)
         if traits is None or traits not in known.alike:
             known.compiled[map_name] = compiled
-        if traits is not None:
+        if traits is not None and compiled.anywhere:
             known.alike.setdefault(traits, compiled)
         return compiled
 
     def _compile_map(self, map_name: str) -> CompiledMap:
-        options, known = self.options, self._known
-        traits = self.dataset.traits(map_name)
-        if traits in known.alike:
-            if traits not in known.copies:
-                first = known.alike[traits]
-                known.copies[traits] = ScenarioCopies(first.scenario, first.network)
-            network = self.dataset.network(map_name)
-            if (copied := known.copies[traits].over(network)) is not None:
-                return known.alike[traits].over(copied, network)
-        scenario, network = self.compile(map_name)
+        known, traits = self._known, self.dataset.traits(map_name)
+        alike = known.alike.get(traits) if traits is not None else None
+        if traits is None or alike is None:
+            return self._with_prefilter(*self.compile(map_name))
+        if traits not in known.copies:
+            known.copies[traits] = ScenarioCopies(alike.scenario, alike.network)
+        network = self.dataset.network(map_name)
+        copied = known.copies[traits].over(network)
+        return alike.over(*((copied, network) if copied is not None else self.compile(map_name)))
+
+    def _with_prefilter(self, scenario: Scenario, network: Network) -> CompiledMap:
+        options = self.options
         how = {"prefilter": options.prefilter, "proofs": options.proofs, "reasons": self._reasons(scenario)}
         return CompiledMap.of(scenario, network, options.match, **how)
+
+    def _alike(self, traits: MapTraits) -> CompiledMap | None:
+        """The program over what stands for all maps of some traits; None where each has one of its own."""
+        known = self._known
+        if traits not in known.tried:
+            known.tried.add(traits)
+            if traits not in known.alike and (abstract := self._compile_abstract(traits)) is not None:
+                known.alike[traits] = abstract
+        return known.alike.get(traits)
+
+    def _compile_abstract(self, traits: MapTraits) -> CompiledMap | None:
+        """The program over any map of some traits; None where that says too little, or few maps have them."""
+        if not self.options.prefilter or self.dataset.mapped.count_alike(traits) <= MAPS_KEPT:
+            return None
+        network = AbstractNetwork(traits)
+        try:
+            return self._with_prefilter(self._compile_over(network), network)
+        except (NeedsMapError, ScenarioError):
+            # what is wrong with the program, or lacking, is said of a map
+            return None
 
     def planned_map(self, map_name: str) -> CompiledMap:
         """The scenario over a map, or over another from which it differs in no more than the network.
@@ -267,7 +304,7 @@ class Query:
         if map_name in known.lacking:
             raise known.lacking[map_name].with_traceback(None)
         traits = self.dataset.traits(map_name)
-        alike = None if traits is None else known.alike.get(traits)
+        alike = None if traits is None else self._alike(traits)
         try:
             return self.compiled_map(map_name) if alike is None else alike
         except ScenarioError as error:
@@ -476,8 +513,8 @@ class Query:
         last: CompiledMap | None = None
         for name in filter(self.frames, self.dataset.maps):
             here = None if name in lacking else self.planned_map(name)
-            # what happens over time, or is recorded, is of one map
-            joins = here is not None and here is last and not (self.over_time(here.scenario) or here.scenario.records)
+            # what is recorded is of one map
+            joins = here is not None and here is last and not here.scenario.records
             if run and not joins:
                 yield run
                 run = []

@@ -10,8 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from scenicq.errors import Diagnostic, Span, render
-from scenicq.forest.compute import CannotEvaluate
+from scenicq.errors import CannotEvaluate, Diagnostic, Span, render
 from scenicq.forest.groups import Group
 from scenicq.match.explanation import (
     Finding,
@@ -31,7 +30,6 @@ from scenicq.query.explain.changes import show_tolerance
 from scenicq.query.explain.margins import SatisfiedConstraint, margins
 from scenicq.query.explain.nearest_miss import Closest, closest, separated
 from scenicq.query.explain.violations import Violation, violations
-from scenicq.smt.encode import UnsupportedError
 from scenicq.smt.smtlib import to_smtlib
 from scenicq.store.labels import Label
 
@@ -221,8 +219,6 @@ def _formula(
     try:
         problem = encoded([attempt.items(group, assignment)], matcher.options).problem
         text = to_smtlib(problem, matcher.options.precision)
-    except UnsupportedError as error:
-        text = f"; no formula: {error}\n"
     except CannotEvaluate as error:
         text = f"; no formula: {error}\n"
     head = "".join(f"; {line}\n" for line in (*about, f"verdict: {verdict}"))

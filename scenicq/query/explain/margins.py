@@ -10,9 +10,8 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from scenicq.errors import Span
+from scenicq.errors import CannotEvaluate, Span
 from scenicq.forest.bounds import scalar_bounds
-from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.groups import Comparison, Condition
 from scenicq.forest.nodes import Constant, Identity, Node, Value
 from scenicq.geometry.angles import normalize

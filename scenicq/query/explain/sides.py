@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from scenicq.forest.compute import CannotEvaluate
+from scenicq.errors import CannotEvaluate
 from scenicq.forest.groups import PARAMS, Condition, Group
 from scenicq.forest.nodes import Compare, Constant, Distance, Identity, Logic, LogicOp, Node, Norm, Value
 from scenicq.forest.walk import features, leaves

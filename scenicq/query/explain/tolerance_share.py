@@ -1,7 +1,8 @@
-"""How many of the frames that match do so by a tolerance alone: with exact positions, or headings, they would not.
+"""How many matches there are by a tolerance alone: with exact positions, or headings, they would not be.
 
-Frames are matched again with that part of the tolerance left out, as many as there is time for, in an order that chance
-gives. A frame of which that is undecided does not count.
+They are matched again with that part of the tolerance left out, as many as there is time for, in an order that chance
+gives; intervals at their first frames, with whoever plays the roles: no tolerance holds in conditions over time.
+What is undecided does not count.
 """
 
 from __future__ import annotations
@@ -15,50 +16,55 @@ from scenicq.forest.scenario import Scenario
 from scenicq.match.matcher import Matcher
 from scenicq.match.tolerance import EXACT, Tolerance
 from scenicq.match.verdict import NoMatch
+from scenicq.query.execution.interval_frames import roles_in
 from scenicq.query.execution.lazy_solver import LazySolver
+from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query
 from scenicq.store.labels import Label
 
 __all__ = ["ToleranceShare", "by_tolerance_alone"]
 
 _TOGETHER = 10
-"""Frames that are read together."""
+"""Matches of which frames are read together."""
 _LONGEST_S = 0.1
-"""Seconds for one frame."""
+"""Seconds for one match."""
 _PLACES = ("position", "x", "y")
 
 
 @dataclass(frozen=True, slots=True)
 class ToleranceShare:
-    """How many of some frames match by a tolerance alone.
+    """How many of some matches there are by a tolerance alone.
 
     Attributes:
-        frames: How many frames there are.
+        matches: How many were looked at.
         positions, headings: How many of them would not match with exact positions, or headings.
     """
 
-    frames: int
+    matches: int
     positions: int
     headings: int
 
 
-def by_tolerance_alone(query: Query, frames: Sequence[str], budget_s: float) -> ToleranceShare:
-    """How many of some frames match by a tolerance alone, as far as there is time.
+def by_tolerance_alone(query: Query, matches: Sequence[Result], budget_s: float) -> ToleranceShare:
+    """How many of some matches there are by a tolerance alone, as far as there is time.
 
     Args:
-        query: The query by which they match; it is about frames.
-        frames: Their names.
-        budget_s: Seconds after which no other frame is begun.
+        query: The query that finds them.
+        matches: Frames or intervals that match.
+        budget_s: Seconds after which no other match is begun.
     """
     until = time.monotonic() + budget_s
     tolerance = query.options.match.tolerance
     counted, alone = 0, [0, 0]
-    order = list(frames)
+    order = list(matches)
     random.Random(0).shuffle(order)
     matchers: dict[str, list[Matcher | None]] = {}
     with LazySolver(query.options.solver) as solver:
         for first in range(0, len(order), _TOGETHER):
-            for label in query.dataset.labels(order[first : first + _TOGETHER]):
+            some = order[first : first + _TOGETHER]
+            labels = {each.frame: each for each in query.dataset.labels(dict.fromkeys(each.frame for each in some))}
+            for result in some:
+                label = labels[result.frame]
                 if time.monotonic() >= until:
                     return ToleranceShare(counted, *alone)
                 if label.map not in matchers:
@@ -70,12 +76,17 @@ def by_tolerance_alone(query: Query, frames: Sequence[str], budget_s: float) -> 
                     ]
                 counted += 1
                 for number, matcher in enumerate(matchers[label.map]):
-                    alone[number] += matcher is not None and _fails(matcher, label)
+                    alone[number] += matcher is not None and _fails(matcher, label, result)
     return ToleranceShare(counted, *alone)
 
 
-def _fails(matcher: Matcher, label: Label) -> bool:
-    return isinstance(matcher.match(label), NoMatch)
+def _fails(matcher: Matcher, label: Label, result: Result) -> bool:
+    if result.interval is None:
+        return isinstance(matcher.match(label), NoMatch)
+    # others come later
+    there = {each.name for each in matcher.scenario.objects}
+    roles = {name: member for name, member in roles_in(label, result).items() if name in there}
+    return isinstance(matcher.match(label, given=roles), NoMatch)
 
 
 def _exact_places(tolerance: Tolerance) -> Tolerance:

@@ -8,9 +8,8 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from scenicq.errors import Span
+from scenicq.errors import CannotEvaluate, Span
 from scenicq.forest.bounds import scalar_bounds
-from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.condition import condition
 from scenicq.forest.groups import Comparison, Condition, Group
 from scenicq.forest.nodes import Constant, Encloses, Index, Node, PointIn, Undefined, Value

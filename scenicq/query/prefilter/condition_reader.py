@@ -43,8 +43,15 @@ from scenicq.geometry.regions import Everywhere, IntersectionOf, Region
 from scenicq.geometry.road_direction import RoadDirection
 from scenicq.limits import LIMITS
 from scenicq.match.tolerance import SLACK, Tolerance
-from scenicq.query.prefilter.map_relations import MapRelations, MeantElements, allowed_elements, shared_look_ups
+from scenicq.query.prefilter.map_relations import (
+    MapRelations,
+    MeantElements,
+    allowed_elements,
+    is_along,
+    shared_look_ups,
+)
 from scenicq.query.prefilter.regions import near_region, nearest_box
+from scenicq.query.prefilter.said_columns import in_said_truths, said_columns
 from scenicq.query.prefilter.sql_bounds import ARITHMETIC, SqlBounds
 from scenicq.query.prefilter.sql_ends import (
     SQL,
@@ -69,6 +76,8 @@ EGO = "ego"
 _NUMBERS = ("heading", "width", "length", "height")
 _AT_THE_PLACE = -2 * SLACK
 """How far a place may be from a bound for it to be surely on the right side, where comparisons allow for slack."""
+_NO_TURN = -1.0
+"""No lane leads as little from any heading."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,19 +139,25 @@ class ConditionReader:
     proving: bool = False
     radius: float | None = None
     _required: tuple[Node, ...] = field(init=False)
+    _said: tuple[Node, ...] = field(init=False)
     _bounds: dict[tuple[int, ...], SqlBounds] = field(default_factory=dict["tuple[int, ...]", "SqlBounds"])
 
     def __post_init__(self) -> None:
         """Take apart what is required."""
         stated = [each.condition for each in self.scenario.requirements if each.built_in is None]
         self._required = tuple(part for each in stated for part in conjuncts(each))
+        self._said = tuple(map(in_said_truths, self._required))
 
-    def comparison(self, item: Comparison, meant: MeantElements | None = None) -> Iterator[ColumnCondition]:
+    def comparison(
+        self, item: Comparison, meant: MeantElements | None = None, heading: Node | None = None
+    ) -> Iterator[ColumnCondition]:
         """What it says that a feature of a label object has a value that an expression takes.
 
         Args:
             item: The feature, of an object, with its expression.
             meant: The elements that may be meant where the ego is, where that is to be proved.
+            heading: What the object's heading is compared with, for a position: it is told with it where it is that
+                of the lane that the object is in.
         """
         index, node = item.object, item.expression
         objects = self._objects(node, about=index)
@@ -154,7 +169,7 @@ class ConditionReader:
         if own is None or width is None or not self._has_columns(node, bounds):
             yield self._unreadable(objects)
         elif item.property == "position":
-            yield from self._position(index, node, objects, width, meant)
+            yield from self._position(index, node, objects, width, meant, heading)
         elif item.property == "heading":
             yield ColumnCondition(objects, self._heading(index, node, bounds, width))
         elif isinstance(own, str):
@@ -170,7 +185,7 @@ class ConditionReader:
             root: The condition.
             meant: The elements that may be meant where the ego is, where that is to be proved.
         """
-        for part in conjuncts(in_ego_frame(root, self.scenario.ego)):
+        for part in conjuncts(in_said_truths(in_ego_frame(root, self.scenario.ego))):
             objects = self._objects(part)
             looked_up = self._looked_up(part, objects, meant)
             if looked_up is not None:
@@ -219,10 +234,11 @@ class ConditionReader:
     # --- positions
 
     def _position(
-        self, index: int, node: Node, objects: tuple[int, ...], width: float, meant: MeantElements | None
-    ) -> Iterator[ColumnCondition]:
+        self, index: int, node: Node, objects: tuple[int, ...], width: float, meant: MeantElements | None,
+        heading: Node | None,
+    ) -> Iterator[ColumnCondition]:  # fmt: skip
         if isinstance(node, PointIn):
-            yield from self._inside(index, node.region, objects, width, meant)
+            yield from self._inside(index, node.region, objects, width, meant, heading)
             return
         bounds = self._over(objects)
         x, y = bounds.columns[index, "position"]
@@ -267,8 +283,9 @@ class ConditionReader:
         )
 
     def _inside(
-        self, index: int, region: Node, objects: tuple[int, ...], width: float, meant: MeantElements | None
-    ) -> Iterator[ColumnCondition]:
+        self, index: int, region: Node, objects: tuple[int, ...], width: float, meant: MeantElements | None,
+        heading: Node | None = None,
+    ) -> Iterator[ColumnCondition]:  # fmt: skip
         """That an object's place, or one within a width of it in metres, lies in a region."""
         parts = _intersected(region)
         own = () if index == self.scenario.ego else (index,)
@@ -285,7 +302,11 @@ class ConditionReader:
                 case _ if width > MEMBERSHIP_RADIUS_M - SLACK:
                     pass  # memberships are recorded up to a distance: a wider tolerance cannot be told by them
                 case Select():
-                    near = None if self.proving and len(parts) > 1 else self._in_looked_up(part, width, meant)
+                    near = (
+                        None
+                        if self.proving and len(parts) > 1
+                        else self._in_looked_up(index, part, width, meant, heading)
+                    )
                 case _ if isinstance(part, Region):
                     near = near_region(part, self.relations.names, width)
                 case _:
@@ -299,7 +320,9 @@ class ConditionReader:
         left = self.radius - width - 2 * SLACK
         return ColumnCondition(own, f"a.ego_distance <= {number(left)}" if own else left > 0)
 
-    def _in_looked_up(self, region: Select, width: float, meant: MeantElements | None) -> str | None:
+    def _in_looked_up(
+        self, index: int, region: Select, width: float, meant: MeantElements | None, heading: Node | None
+    ) -> str | None:
         """A condition on memberships that an object meets in a region that depends on where the ego is."""
         look_up = self.relations.of_ego(region.index)
         if look_up is None:
@@ -308,7 +331,14 @@ class ConditionReader:
             meant = self.relations.possible_elements(look_up, self._required)
         if meant is None or (self.proving and self.radius is not None):
             return None
-        return self.relations.in_region(region, look_up, meant, width)
+        return self.relations.in_region(region, look_up, meant, width, self._turn(index, region, heading))
+
+    def _turn(self, index: int, region: Select, heading: Node | None) -> float | None:
+        """How far the lane that an object is in may, or must at most, lead from its heading; None for any way."""
+        if heading is None or not is_along(heading, region, index):
+            return None
+        width = self._width(index, "heading")
+        return _NO_TURN if width is None else width if self.proving else width + SLACK
 
     def _in_view(self, region: DiscAt | SectorAt, index: int, objects: tuple[int, ...], width: float) -> SqlTruth:
         bounds = self._over(objects)
@@ -409,6 +439,9 @@ class ConditionReader:
                 for index, (alias, prefix) in aliases.items()
                 for name, column in object_columns(alias, prefix).items()
             }
+            attributes = {index: f"{alias}.{prefix}attributes" for index, (alias, prefix) in aliases.items()}
+            own = [(index, name) for index in aliases for name in self.scenario.objects[index].properties]
+            columns |= said_columns(self._said, attributes, own)
             self._bounds[objects] = SqlBounds(columns, self._nearest)
         return self._bounds[objects]
 

@@ -11,8 +11,9 @@ from dataclasses import replace
 
 from scenicq.errors import Span
 from scenicq.forest.groups import PARAMS, Comparison, Condition, Group
-from scenicq.forest.nodes import Node, Select
+from scenicq.forest.nodes import Node, PointIn, Select
 from scenicq.forest.scenario import Scenario
+from scenicq.forest.unobserved import is_only_observed
 from scenicq.forest.walk import conjuncts, postorder
 from scenicq.geometry.network import Network
 from scenicq.match.options import MatchOptions
@@ -22,6 +23,7 @@ from scenicq.query.prefilter.map_relations import (
     MapRelations,
     MeantElements,
     allowed_elements,
+    is_along,
     look_up_of,
     shared_look_ups,
 )
@@ -52,7 +54,8 @@ def necessary_conditions(
     for owner in scenario.objects:
         for name in compared(owner, frozenset(owner.properties)):
             given = owner.properties[name]
-            found = reader.comparison(Comparison(owner.index, name, given.value, given.span))
+            heading = owner.properties["heading"].value if "heading" in owner.properties else None
+            found = reader.comparison(Comparison(owner.index, name, given.value, given.span), heading=heading)
             yield from _named(found, f"{owner.name}.{name}", given.span)
     for requirement in scenario.requirements:
         if requirement.built_in is None and requirement.span is not None:
@@ -91,7 +94,11 @@ def sufficient_conditions(
     reader = ConditionReader(scenario, tolerance, relations, network.roadDirection, proving=True, radius=options.radius)
     relevant = relevant_properties(scenario, options)
     found = list(_without_attributes(scenario, options, relevant))
-    signature = (*(names & _COLUMNED for names in relevant), frozenset[str]())
+    told = [
+        frozenset(name for name in names if name in _COLUMNED or is_only_observed(scenario, index, name))
+        for index, names in enumerate(relevant)
+    ]
+    signature = (*told, frozenset[str]())
     for group in build_groups(scenario, signature, options):
         found += _proof(group, reader, scenario.ego, options.classes)
     if any(each.sql is False for each in found):
@@ -105,7 +112,8 @@ def _without_attributes(
     """That a label has an ego and nothing that is compared but what has columns."""
     yield ColumnCondition((), f"{EGO}.ego_class <> ''")
     for index, names in enumerate(relevant):
-        others = sorted(names - _COLUMNED)
+        # what labels alone tell is read, not taken for granted
+        others = sorted(name for name in names - _COLUMNED if not is_only_observed(scenario, index, name))
         if others and index == scenario.ego:
             yield ColumnCondition((), _lacks(f"{EGO}.ego_attributes", others))
         elif others:
@@ -118,7 +126,8 @@ def _without_attributes(
 def _proof(group: Group, reader: ConditionReader, ego: int, classes: Granularity) -> Iterator[ColumnCondition]:
     """What proves that all constraints of a group can be satisfied together."""
     comparisons = [each for each in group.constraints if isinstance(each, Comparison)]
-    if len(comparisons) > 1 or any(each.object == PARAMS for each in comparisons):
+    along = next((each for each in comparisons if any(_is_told_by(each, place) for place in comparisons)), None)
+    if len(comparisons) > 1 + (along is not None) or any(each.object == PARAMS for each in comparisons):
         yield ColumnCondition((), False)
         return
     meant = _meant_elements(group, ego)
@@ -130,8 +139,15 @@ def _proof(group: Group, reader: ConditionReader, ego: int, classes: Granularity
                     yield from reader.requirement(part, meant)
                 else:
                     yield ColumnCondition((), sql)
-        else:
-            yield from reader.comparison(constraint, meant)
+        elif constraint is not along:
+            yield from reader.comparison(constraint, meant, None if along is None else along.expression)
+
+
+def _is_told_by(heading: Comparison, place: Comparison) -> bool:
+    """Whether a heading is the direction of the lane that an object is in, which is told together with the lane."""
+    about = (place.property, heading.property, heading.object) == ("position", "heading", place.object)
+    node = place.expression
+    return about and isinstance(node, PointIn) and is_along(heading.expression, node.region, place.object)
 
 
 def _meant_elements(group: Group, ego: int) -> MeantElements | None:

@@ -12,7 +12,7 @@ from __future__ import annotations
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain, groupby, islice, pairwise
+from itertools import chain, islice, pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -37,6 +37,7 @@ __all__ = [
     "join_first",
     "keep_players",
     "names",
+    "object_rows",
     "run_plan",
     "run_players",
     "run_prefilter",
@@ -86,7 +87,8 @@ class Block:
         first, end: The rows of its labels, the end left out.
         recordings: Only from the first of these to the second, in order of their names; None for all.
         runs: Of a query over time, the first and the last row of each recording, the last left out: they stay whole.
-        maps: Where its rows are those of several maps, and of nothing else: their names in the order of the rows.
+        maps: Where its rows are those of several maps, and of nothing else: their names in the order of the rows; of
+            a query over time that of each recording.
     """
 
     map: str
@@ -105,10 +107,23 @@ class Block:
     def halves(self) -> tuple[Block, Block]:
         """The block in two; it must be divisible."""
         if self.runs:
-            first, second = self.runs[: len(self.runs) // 2], self.runs[len(self.runs) // 2 :]
-            return replace(self, end=first[-1][1], runs=first), replace(self, first=second[0][0], runs=second)
+            middle = len(self.runs) // 2
+            return self._some_runs(0, middle), self._some_runs(middle, len(self.runs))
         middle = (self.first + self.end) // 2
         return replace(self, end=middle), replace(self, first=middle)
+
+    def _some_runs(self, low: int, high: int) -> Block:
+        runs, maps = self.runs[low:high], self.maps[low:high]
+        own = maps[0] if maps else self.map
+        return replace(self, map=own, first=runs[0][0], end=runs[-1][1], runs=runs, maps=maps)
+
+    def by_map(self) -> list[Block]:
+        """The recordings of a query over time, map by map."""
+        if not self.maps:
+            return [self]
+        ends = [n for n in range(1, len(self.maps)) if self.maps[n] != self.maps[n - 1]]
+        cuts = pairwise([0, *ends, len(self.maps)])
+        return [replace(self._some_runs(low, high), maps=()) for low, high in cuts]
 
     @property
     def where(self) -> str:
@@ -134,7 +149,8 @@ class Block:
             return None
         if bool(self.maps) != bool(other.maps) or (not self.maps and self.map != other.map):
             return None
-        maps = tuple(dict.fromkeys((*self.maps, *other.maps)))
+        maps = (*self.maps, *other.maps)
+        maps = maps if self.runs else tuple(dict.fromkeys(maps))
         return replace(self, end=other.end, runs=(*self.runs, *other.runs), maps=maps)
 
 
@@ -270,22 +286,53 @@ def whole_recordings(dataset: Dataset, connection: duckdb.DuckDBPyConnection, cu
         cut: Blocks in the order of the store.
     """
     found: list[Block] = []
-    for (part, map_name, between), group in groupby(cut, key=lambda block: (block.part, block.map, block.recordings)):
-        blocks_ = list(group)
+    for blocks_ in _of_same_maps(cut):
         size = max(block.end - block.first for block in blocks_)
         whole = replace(blocks_[0], end=blocks_[-1].end)
-        labels = dataset.scan("labels", part, numbered=True)
+        labels = dataset.scan("labels", whole.part, numbered=True)
         rows = connection.execute(
-            "SELECT min(file_row_number), max(file_row_number) + 1 "
-            f"FROM {labels} WHERE {whole.where} GROUP BY recording ORDER BY 1"
+            "SELECT min(file_row_number), max(file_row_number) + 1, map "
+            f"FROM {labels} WHERE {whole.where} GROUP BY map, recording ORDER BY 1"
         ).fetchall()
         run: list[tuple[int, int]] = []
-        for number, (first, end) in enumerate(rows):
+        maps: list[str] = []
+        for number, (first, end, name) in enumerate(rows):
             run.append((first, end))
+            maps.append(name)
             if end - run[0][0] >= size or number + 1 == len(rows):
-                found.append(Block(map_name, part, run[0][0], run[-1][1], between, tuple(run)))
-                run = []
+                shared = tuple(maps) if whole.maps else ()
+                found.append(
+                    Block(maps[0], whole.part, run[0][0], run[-1][1], whole.recordings, tuple(run), shared)
+                )  # fmt: skip
+                run, maps = [], []
     return found
+
+
+def _of_same_maps(cut: Iterable[Block]) -> Iterator[list[Block]]:
+    """Blocks in order, those together that are of one map of a part, or that follow each other."""
+    group: list[Block] = []
+    for block in cut:
+        if group:
+            last = group[-1]
+            own = (block.part, block.map, block.recordings) == (last.part, last.map, last.recordings)
+            follows = (block.part, block.first) == (last.part, last.end)
+            if bool(last.maps) != bool(block.maps) or not (follows if block.maps else own):
+                yield group
+                group = []
+        group.append(block)
+    if group:
+        yield group
+
+
+def object_rows(
+    dataset: Dataset, connection: duckdb.DuckDBPyConnection, block: Block
+) -> dict[str, tuple[int, int]]:  # fmt: skip
+    """Where the label objects of each map of a block are: the first row, and that behind the last."""
+    rows = connection.execute(
+        "SELECT map, min(first_object), max(first_object + object_count) "
+        f"FROM {dataset.scan('labels', block.part, numbered=True)} WHERE {block.where} GROUP BY map"
+    ).fetchall()
+    return {name: (first, end) for name, first, end in rows}
 
 
 _TABLES = {LABELS: "labels", OBJECTS: "objects", MEMBERSHIPS: "memberships", SENSORS: "sensors"}

@@ -10,15 +10,14 @@ elements that may be meant (necessary), and of those that surely lie at the plac
 from __future__ import annotations
 
 import functools
-import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from scenicq.errors import CannotEvaluate
 from scenicq.forest.column_domain import ColumnDomain, first_direction
 from scenicq.forest.columns import DEFINED, UNKNOWN, Column, truth_of
-from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.interpret import interpret, steps_of
 from scenicq.forest.nodes import (
     Arithmetic,
@@ -34,18 +33,22 @@ from scenicq.forest.nodes import (
     Select,
 )
 from scenicq.forest.walk import children, is_leaf
+from scenicq.geometry.abstract_map import AbstractArea, AbstractOccupancy
 from scenicq.geometry.angles import ALONG
 from scenicq.geometry.occupancy import TOLERANCE, ElementAtPoint, Occupancy
-from scenicq.geometry.regions import Region
+from scenicq.geometry.regions import PolygonSet, Region
 from scenicq.limits import LIMITS
 from scenicq.match.tolerance import SLACK
 from scenicq.query.prefilter.regions import RegionNames, among_names, region_ids
 from scenicq.query.prefilter.sql_ends import number
+from scenicq.store.sql import sql_text
 
-__all__ = ["LookUp", "MapRelations", "MeantElements", "allowed_elements", "look_up_of", "shared_look_ups"]
+__all__ = ["LookUp", "MapRelations", "MeantElements", "allowed_elements", "is_along", "look_up_of", "shared_look_ups"]
 
 _AT = f"distance <= {number(TOLERANCE + SLACK)}"
 """An element that may be found at a place."""
+_EVERY_RANK = 1 << 30
+"""More elements than lie at any place."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,7 +88,8 @@ def look_up_of(node: Node) -> LookUp | None:
     first = found[0]
     if first is None or not all(each is not None and each.is_like(first) for each in found):
         return None
-    return replace(first, ranks=len(found), choice=choice)
+    ranks = _EVERY_RANK if isinstance(first.occupancy, AbstractOccupancy) else len(found)
+    return replace(first, ranks=ranks, choice=choice)
 
 
 def _of_rank(node: Node) -> LookUp | None:
@@ -97,6 +101,43 @@ def _of_rank(node: Node) -> LookUp | None:
             return LookUp(one.options, place.object, by_heading=one.by_heading)
         case _:
             return None
+
+
+def is_along(heading: Node, region: Node, object: int) -> bool:
+    """Whether a heading is the direction where an object is of the very lane that a region is.
+
+    Args:
+        heading: The heading.
+        region: The region.
+        object: The object, by index.
+    """
+    match heading, region:
+        case (
+            DirectionAt(field=Select() as fields, point=Feature(property="position") as place),
+            Select() as areas,
+        ) if fields.index is areas.index and place.object == object:
+            pass
+        case _:
+            return False
+    look_up = look_up_of(areas.index)
+    if look_up is None:
+        return False
+    occupancy = look_up.occupancy
+    if isinstance(occupancy, AbstractOccupancy):
+        return occupancy.is_of_lanes
+    if not occupancy.is_of_lanes:
+        return False
+    layer, *others = occupancy.layers
+    if others:
+        return False
+    return all(
+        isinstance(area, Constant)
+        and isinstance(field, Constant)
+        and isinstance(area.value, PolygonSet)
+        and area.value.orientation is field.value is occupancy.ways[0][owner]
+        for _, number, owner in layer
+        for area, field in ((areas.options[number], fields.options[number]),)
+    )
 
 
 @functools.lru_cache(maxsize=256)
@@ -187,48 +228,38 @@ class MapRelations:
         """Whether no condition asks for a table."""
         return not self._tables
 
-    def queries(self, rows: str, labels: str, objects: str) -> Iterator[tuple[str, str]]:
+    def queries(self, rows: str) -> Iterator[tuple[str, str]]:
         """The tables that conditions ask for, each with its query.
 
         Args:
             rows: The table of memberships of the ego and whoever may play a role, with the numbers `f` of their frames.
-            labels: The table of frames.
-            objects: The table of objects.
         """
         for table, name in self._tables.items():
             own = "object <> 'ego'" if table.everybody else "object = 'ego'"
-            at = f"SELECT f, object, region, distance FROM {rows} WHERE {own} AND {_AT}"
-            if table.first:
+            kind = f" AND kind = {sql_text(table.kind)}" if table.kind else ""
+            at = f"SELECT f, object, region, distance, turn FROM {rows} WHERE {own} AND {_AT}{kind}"
+            if table.most:
+                first = f" WHERE region IN {among_names(table.first, self.names)}" if table.first else ""
                 at = (
-                    "SELECT f, object, region, count(*) OVER (PARTITION BY f, object) AS several "
-                    f"FROM ({at}) WHERE region IN {among_names(table.first, self.names)} "
+                    f"SELECT *, count(*) OVER (PARTITION BY f, object) AS several FROM ({at}){first} "
                     f"QUALIFY distance = 0 AND several <= {table.most}"
                 )
-            if table.ways:
-                ways = self.names.table("source, heading, turn", *map(list, zip(*table.ways, strict=True)))
-                goes = (
-                    f"(SELECT l.number AS f, a.id AS object, a.heading FROM {objects} a JOIN {labels} l USING (frame))"
-                    if table.everybody
-                    else f"(SELECT number AS f, 'ego' AS object, ego_heading AS heading FROM {labels})"
-                )
-                off = "(g.heading - w.heading)"
-                off = f"abs({off} - 2 * pi() * round({off} / (2 * pi())))"
-                at = (
-                    f"SELECT f, object, p.region FROM ({at}) p JOIN {goes} g USING (f, object) "
-                    f"JOIN {ways} w ON w.source = p.region "
-                    f"WHERE several = 1 OR g.heading IS NULL OR {off} + w.turn <= {number(ALONG - SLACK)}"
-                )
-            relation = self.names.table("source, region", *([pair[side] for pair in table.pairs] for side in (0, 1)))
-            yield (
-                name,
-                f"SELECT DISTINCT e.f, e.object, r.region FROM ({at}) e JOIN {relation} r ON r.source = e.region",
-            )
+            if table.by_heading:
+                at = f"SELECT * FROM ({at}) WHERE several = 1 OR turn <= {number(ALONG - SLACK)}"
+            meant, joined = "region", ""
+            if not table.kind:
+                pairs = ([pair[side] for pair in table.pairs] for side in (0, 1))
+                relation = self.names.table("source, region", *pairs)
+                meant, joined = "r.region", f" JOIN {relation} r ON r.source = e.region"
+            yield name, f"SELECT DISTINCT e.f, e.object, {meant} AS region FROM ({at}) e{joined}"
 
     def possible_elements(self, look_up: LookUp, required: Sequence[Node]) -> MeantElements:
         """Which elements a look-up may mean where all of some conditions hold."""
         return MeantElements(_among(look_up, required))
 
-    def in_region(self, region: Select, look_up: LookUp, meant: MeantElements, reach: float) -> str | None:
+    def in_region(
+        self, region: Select, look_up: LookUp, meant: MeantElements, reach: float, turn: float | None = None
+    ) -> str | None:
         """A condition on memberships that an object meets which lies in a region that depends on where the ego is.
 
         Args:
@@ -236,6 +267,7 @@ class MapRelations:
             look_up: That where the ego is, on which the region depends.
             meant: The elements that may be meant: the map may have no such region for others.
             reach: Metres that the object may be off; at most `MEMBERSHIP_RADIUS_M`.
+            turn: How far the region, a lane, leads from the object's heading at most; None for any way.
 
         Returns:
             SQL over the columns of `memberships` and `q.f`; None if the region is not made of elements of the map.
@@ -250,7 +282,12 @@ class MapRelations:
         table = self._table(look_up, regions, meant.most)
         if table is None:
             return None
-        return f"((q.f, region) IN (SELECT f, region FROM {table}) AND distance <= {number(reach + SLACK)})"
+        near = f"(q.f, region) IN (SELECT f, region FROM {table}) AND distance <= {number(reach + SLACK)}"
+        if turn is None:
+            return f"({near})"
+        # it is not known of those beside a lane
+        led = f"turn <= {number(turn)}" if meant.most else f"coalesce(turn <= {number(turn)}, true)"
+        return f"({near} AND {led})"
 
     def may_hold(self, look_up: LookUp, numbers: frozenset[int], required: Sequence[Node]) -> str | None:
         """A condition on memberships that a condition on what lies where an object is amounts to.
@@ -263,8 +300,13 @@ class MapRelations:
         Returns:
             SQL over the columns of the object's memberships; None where the condition may hold where nothing lies.
         """
-        sources, among = self._sources(look_up.occupancy), numbers & _among(look_up, required)
-        if sources is None or look_up.occupancy.nothing in among:
+        among = numbers & _among(look_up, required)
+        if look_up.occupancy.nothing in among:
+            return None
+        if isinstance(look_up.occupancy, AbstractOccupancy):
+            return f"(kind = {sql_text(look_up.occupancy.kind)} AND {_AT})" if among else "false"
+        sources = self._sources(look_up.occupancy)
+        if sources is None:
             return None
         ids = sorted({each for layer in sources for each, place in layer if place in among})
         return f"(region IN {among_names(ids, self.names)} AND {_AT})"
@@ -315,6 +357,8 @@ class MapRelations:
 
     def _themselves(self, occupancy: Occupancy) -> dict[int, Sequence[str]]:
         """Each element as the regions in which it is found."""
+        if isinstance(occupancy, AbstractOccupancy):
+            return {0: (occupancy.kind,)}
         found: dict[int, Sequence[str]] = {}
         for layer in self._sources(occupancy) or ():
             for each, place in layer:
@@ -332,7 +376,9 @@ class MapRelations:
         for place, option in enumerate(region.options):
             if not isinstance(option, Constant):
                 return None
-            if isinstance(option.value, Region):
+            if isinstance(option.value, AbstractArea):
+                meant[place] = (option.value.kind,)
+            elif isinstance(option.value, Region):
                 ids = region_ids(option.value, self.names)
                 if ids is None:
                     return None
@@ -361,7 +407,11 @@ class MapRelations:
             most: Any of so many elements at the place may be meant, surely; 0 for what is possible.
             everybody: Whether it is of where all others are, instead.
         """
-        layers = self._sources(look_up.occupancy)
+        occupancy, by_heading = look_up.occupancy, bool(most) and look_up.by_heading
+        if isinstance(occupancy, AbstractOccupancy):
+            # what is meant is the element itself
+            return self._named(_Table((), occupancy.kind if meant else "", (), most, everybody, by_heading))
+        layers = self._sources(occupancy)
         if layers is None:
             return None
         # where an element of the first layer lies, no other layer counts
@@ -370,18 +420,10 @@ class MapRelations:
         if len(pairs) > LIMITS.related_regions:
             return None
         first = tuple(sorted({source for source, _ in layers[0]})) if most else ()
-        ways = self._ways(look_up.occupancy) if most and look_up.by_heading else ()
-        return self._tables.setdefault(_Table(tuple(pairs), first, most, everybody, ways), f"meant{len(self._tables)}")
+        return self._named(_Table(tuple(pairs), "", first, most, everybody, by_heading))
 
-    def _ways(self, occupancy: Occupancy) -> tuple[tuple[str, float, float], ...]:
-        """The regions of the first layer, each with a heading, and how far from it its ways turn at most."""
-        known = self.names.elements
-        # a region that stands for several turns any way
-        spans: dict[str, tuple[float, float]] = {}
-        for element, span in occupancy.spans.items():
-            name = known[element]
-            spans[name] = (0.0, 2 * math.pi) if spans.get(name, span) != span else (span[0], min(span[1], 2 * math.pi))
-        return tuple((name, *span) for name, span in sorted(spans.items()))
+    def _named(self, table: _Table) -> str:
+        return self._tables.setdefault(table, f"meant{len(self._tables)}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -390,15 +432,16 @@ class _Table:
 
     Attributes:
         pairs: The element, and a region that is meant.
+        kind: Instead: the kind of elements of which each means itself.
         first: The elements of the first layer, of which that one must be; empty where any of them will do.
-        most: How many of these may lie at the place.
+        most: How many of these may lie at the place; 0 for any number, of all layers.
         everybody: Whether it is of where all others than the ego are.
-        ways: Where the way that somebody goes says which of several is meant: of each element of the first layer a
-            heading, and how far from it it turns at most.
+        by_heading: Whether the way that somebody goes says which of several is meant.
     """
 
     pairs: tuple[tuple[str, str], ...]
+    kind: str
     first: tuple[str, ...]
     most: int
     everybody: bool
-    ways: tuple[tuple[str, float, float], ...]
+    by_heading: bool

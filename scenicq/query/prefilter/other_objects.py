@@ -32,6 +32,7 @@ from scenicq.forest.nodes import (
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.walk import conjuncts, features, transform
 from scenicq.query.prefilter.condition_reader import EGO, object_columns
+from scenicq.query.prefilter.said_columns import in_said_truths, said_columns
 from scenicq.query.prefilter.sql_bounds import SqlBounds
 from scenicq.query.prefilter.sql_ends import SQL, SqlTruth
 from scenicq.store.classes import ROOT, Granularity, class_truth, subclasses
@@ -103,7 +104,6 @@ def _read(part: Node, ego: int, classes: Granularity, *, proving: bool) -> tuple
         return None
     columns = {(ELEMENT, name): column for name, column in object_columns(OTHER).items()}
     columns |= {(ego, name): column for name, column in object_columns(EGO, "ego_").items()}
-    bounds = SqlBounds(columns)
 
     def put_in(each: Node) -> Node:
         if isinstance(each, Feature) and each.object == GIVEN:
@@ -115,7 +115,8 @@ def _read(part: Node, ego: int, classes: Granularity, *, proving: bool) -> tuple
             case _:
                 return each
 
-    body = in_ego_frame(transform(node.body.condition, put_in), ego)
+    body = in_said_truths(in_ego_frame(transform(node.body.condition, put_in), ego))
+    bounds = SqlBounds(columns | said_columns((body,), {ELEMENT: f"{OTHER}.attributes"}, columns))
     # of those who are all that is known is that some may play a role
     roles = node.excluded - 1
     few = negated or every

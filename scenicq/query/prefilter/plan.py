@@ -342,15 +342,15 @@ def _regions(
             f"WHERE ({placed}) AND n.{left}"
         )
     rows = (
-        f"SELECT q.f, m.object, m.kind, m.region, m.distance FROM {MEMBERSHIPS} m JOIN ({' UNION ALL '.join(asked)}) q "
-        "ON m.frame = q.frame AND m.object = q.object"
+        f"SELECT q.f, m.object, m.kind, m.region, m.distance, m.turn FROM {MEMBERSHIPS} m "
+        f"JOIN ({' UNION ALL '.join(asked)}) q ON m.frame = q.frame AND m.object = q.object"
     )
     statements: list[str] = []
     if not relations.is_empty:
         # asked more than once
         statements.append(new_table("placings", rows))
         rows = "SELECT * FROM placings"
-        statements += [new_table(*each) for each in relations.queries("placings", LABELS, OBJECTS)]
+        statements += [new_table(*each) for each in relations.queries("placings")]
     statements.append(
         new_table(
             "flags",

@@ -136,6 +136,8 @@ class SqlBounds:
         column = self.columns.get((node.object, node.property))
         if isinstance(column, tuple):
             return IntervalVector(*map(SQL.known, column))
+        if column is not None and node.kind == "boolean":
+            return Truth(column, SQL.negation(column))
         return None if column is None else SQL.known(column)
 
 

@@ -61,6 +61,11 @@ class CandidateRows:
         may = [np.asarray(found[f"r{place}"], dtype=np.bool_) for place in range(roles)]
         return cls(np.asarray(found["row"], dtype=np.int64), np.column_stack(may))
 
+    def between(self, first: int, end: int) -> CandidateRows:
+        """Those of some rows that follow each other, the end left out."""
+        low, high = np.searchsorted(self.rows, (first, end)).tolist()
+        return CandidateRows(self.rows[low:high], self.may[low:high])
+
 
 def candidate_rows(connection: duckdb.DuckDBPyConnection, plan: Plan) -> CandidateRows:
     """Who may play the roles of a plan in the block on which the prefilter was run last.

@@ -10,8 +10,8 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import shapely
 
+from scenicq.errors import CannotEvaluate
 from scenicq.forest.bounds import scalar_bounds, vector_bounds
-from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.condition import condition, expand
 from scenicq.forest.evaluate import evaluate
 from scenicq.forest.nodes import Constant, Feature, Node, PointIn, Undefined, Value

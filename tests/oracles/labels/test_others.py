@@ -1,7 +1,7 @@
 """`others`, `count` and `nearest` by plain enumeration, sharing no code: random programs over frames and over time.
 
-The heading, the velocity or the class of some label objects is not known as far as a program asks for it. What is
-expected follows Kleene's logic; where that leaves something unknown and the tool tells more, fillings must agree.
+The heading, the velocity, an attribute or the class of some label objects is not known as far as a program asks for it.
+What is expected follows Kleene's logic; where that leaves something unknown and the tool tells more, fillings agree.
 """
 
 from __future__ import annotations
@@ -28,7 +28,6 @@ from scenicq.temporal import samples
 from scenicq.temporal.interval_options import IntervalOptions
 
 Truth = bool | None
-FORMS = ("any", "all", "filtered", "every", "len", "all others", "count", "nearest", "pair", "not", "or")
 ABOVE = {
     "Car": ("Car", "Vehicle", "Object"), "Pedestrian": ("Pedestrian", "Object"),
     "Bicycle": ("Bicycle", "Vehicle", "Object"), "Vehicle": ("Vehicle", "Object"), "Object": ("Object",),
@@ -100,7 +99,10 @@ class OfOne:
 def of_one(draw: random.Random, name: str, roles: list[str], depth: int = 1) -> OfOne:
     limit = draw.randint(2, 14) + 0.3
     role = draw.choice(roles)
-    match draw.choice(["near", "near", "side", "heading", "speed", "not", "and", "farther"]):
+    match draw.choice(["near", "near", "side", "heading", "speed", "not", "and", "farther", "said", "said"]):
+        case "said":
+            text, holds = of_attribute(draw, name)
+            return OfOne(text, lambda w, c: holds(c))
         case "near":
             text = f"(distance from {role} to {name}) < {limit}"
             return OfOne(text, lambda w, c: less(distance(w.roles[role], c), limit))
@@ -131,6 +133,27 @@ def of_one(draw: random.Random, name: str, roles: list[str], depth: int = 1) -> 
             return OfOne(f"{name}.position.x > {limit - 8}", lambda w, c: c.x > limit - 8)
 
 
+def of_attribute(draw: random.Random, name: str) -> tuple[str, Callable[[LabelObject], Truth]]:
+    """A condition on what a label says of an object called by a name; nothing is known where it does not."""
+    key = draw.choice(list(SAID))
+    match key:
+        case "state":
+            op, value = draw.choice(["==", "!="]), draw.choice(SAID[key])
+            text = f'{name}.state {op} "{value}"' if draw.random() < 0.7 else f'"{value}" {op} {name}.state'
+            found = OPS[op]
+        case "points":
+            op, value = draw.choice(list(OPS)), draw.choice(SAID[key])
+            text, found = f"{name}.points {op} {value}", OPS[op]
+        case _:
+            op, value = draw.choice([("", True), ("not ", False)])
+            text, found = f"{op}{name}.towing", operator.eq
+
+    def holds(each: LabelObject) -> Truth:
+        return found(each.attributes[key], value) if key in each.attributes else None
+
+    return text, holds
+
+
 def at_least(truths: list[Truth], number: int) -> Truth:
     sure, may = truths.count(True), len(truths) - truths.count(False)
     return True if sure >= number else False if may < number else None
@@ -156,7 +179,7 @@ def asked(draw: random.Random, roles: list[str], depth: int = 1) -> Asked:
     """A condition on others."""
     kind, number, op = draw.choice(ASKED), draw.randint(0, 3), draw.choice(list(OPS))
     form = draw.choice(
-        ["any", "all", "filtered", "every", "len", "all others", "count", "nearest", "pair", "not", "or"]
+        ["any", "all", "filtered", "every", "len", "all others", "count", "nearest", "pair", "not", "or", "said"]
     )
     match form:
         case "any" | "filtered":
@@ -211,6 +234,15 @@ def asked(draw: random.Random, roles: list[str], depth: int = 1) -> Asked:
             return Asked(text, lambda w: either(False, *(
                 both(w.is_of(c, kind), w.is_of(d, other), c.id != d.id, less(distance(c, d), limit))
                 for c in w.others() for d in w.others())))  # fmt: skip
+        case "said":
+            role = draw.choice(roles)
+            text, says = of_attribute(draw, role)
+
+            def said(w: World) -> Truth:
+                mine = w.roles[role]
+                return None if mine is None else says(mine)
+
+            return Asked(text, said)
         case "not" if depth:
             inner = asked(draw, roles, depth - 1)
             return Asked(f"not ({inner.text})", lambda w: opposite(inner.holds(w)))
@@ -222,6 +254,16 @@ def asked(draw: random.Random, roles: list[str], depth: int = 1) -> Asked:
             return asked(draw, roles, depth)
 
 
+SAID: dict[str, list[str] | list[float] | list[bool]] = {
+    "state": ["parked", "moving", "1"], "points": [1.0, 4.0, 4.5, 20.0], "towing": [True, False],
+}  # fmt: skip
+"""What labels say of objects, with its values."""
+
+
+def attributes(draw: random.Random) -> dict[str, str | float | bool]:
+    return {name: draw.choice(values) for name, values in SAID.items() if draw.random() < 0.75}
+
+
 def label_objects(draw: random.Random, taken: tuple[str, ...] = ()) -> tuple[LabelObject, ...]:
     kinds = ("Car", "Car", "Pedestrian", "Bicycle", "Vehicle")
     return tuple(
@@ -229,12 +271,15 @@ def label_objects(draw: random.Random, taken: tuple[str, ...] = ()) -> tuple[Lab
             f"o{n}", draw.choice(kinds), "x", draw.randint(-9, 9), draw.randint(-9, 9),
             draw.choice([None, 0.0, 1.0, 1.0]), 2.0, 4.0,
             velocity=draw.choice([None, (0.0, 1.0), (3.0, 0.0), (3.0, 0.0)]), track=f"o{n}",
+            attributes=attributes(draw),
         )
         for n in draw.sample(range(30), draw.randint(1, 6))
     )  # fmt: skip
 
 
-EGO = LabelObject("ego", "Car", "car", 0.0, 0.0, 0.0, 2.0, 4.0, velocity=(0.0, 0.0))
+EGO = LabelObject(
+    "ego", "Car", "car", 0.0, 0.0, 0.0, 2.0, 4.0, velocity=(0.0, 0.0), attributes={"state": "moving", "points": 4.0}
+)
 PLACE = "at (Range(-99, 99), Range(-99, 99)), facing Range(-180, 180) deg"
 HEAD = "model scenic.domains.driving.model\nfrom scenicq.labels import others, count, nearest\n"
 
@@ -251,7 +296,8 @@ def filled(draw: random.Random, world: World) -> World:
         kind = draw.choice(["Car", "Bicycle"]) if each.category == "Vehicle" else each.category
         heading = draw.choice([0.0, 1.0]) if each.heading is None else each.heading
         velocity = draw.choice([(0.0, 1.0), (3.0, 0.0)]) if each.velocity is None else each.velocity
-        return replace(each, category=kind, heading=heading, velocity=velocity)
+        said = {name: draw.choice(values) for name, values in SAID.items()} | dict(each.attributes)
+        return replace(each, category=kind, heading=heading, velocity=velocity, attributes=said)
 
     found = {each.id: known(each) for each in world.objects}
     roles = {name: None if each is None else found[each.id] for name, each in world.roles.items()}
@@ -376,7 +422,7 @@ def random_recording(draw: random.Random, name: str) -> Recording:
     for n in range(10):
         seen = [
             replace(each, id=f"{each.id}-{n}", x=each.x + draw.randint(-1, 1) + 0.25 * n, velocity=(3.0, 0.0),
-                    heading=draw.choice([each.heading, 1.0]))
+                    heading=draw.choice([each.heading, 1.0]), attributes=dict(each.attributes) | attributes(draw))
             for each in first
             if draw.random() < 0.85
         ]  # fmt: skip

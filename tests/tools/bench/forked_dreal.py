@@ -12,7 +12,7 @@ import pickle
 from scenicq.limits import LIMITS
 from scenicq.smt import dreal
 from scenicq.smt.answer import Answer, NoAnswer
-from scenicq.smt.formula import Problem
+from scenicq.smt.problem import Problem
 
 __all__ = ["by_dreal", "by_dreal_as_it_is"]
 

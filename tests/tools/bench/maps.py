@@ -39,6 +39,8 @@ MODEL = "model scenic.domains.driving.model\nego = new Car\n"
 QUESTIONS = {
     "beside the ego": f"{MODEL}other = new Car at ego offset by Range(-4, 4) @ Range(2, 30)",
     "on the road": f"{MODEL}other = new Car on road, facing Range(-20, 20) deg relative to roadDirection",
+    "ahead in the lane of the ego": f"{MODEL}other = new Car on ego.lane, facing Range(-20, 20) deg relative to "
+    "ego.heading\nrequire 5 < (distance to other) < 20",
     "in the lane of the ego": f"{MODEL}other = new Car on ego.lane\nrequire (distance to other) < 30",
 }
 

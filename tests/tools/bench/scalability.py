@@ -40,7 +40,7 @@ from scenicq.match.options import MatchOptions, Method  # noqa: E402
 from scenicq.match.verdict import Match, Unknown, Verdict  # noqa: E402
 from scenicq.query.execution.lazy_solver import LazySolver  # noqa: E402
 from scenicq.smt.answer import Answer, NoAnswer, Solver, SolverSession  # noqa: E402
-from scenicq.smt.formula import Problem  # noqa: E402
+from scenicq.smt.problem import Problem  # noqa: E402
 from scenicq.smt.worker_solver import WorkerSolver  # noqa: E402
 from scenicq.store.labels import Label  # noqa: E402
 

@@ -43,7 +43,7 @@ from scenicq.match.linear.affine_reach import Reach  # noqa: E402
 from scenicq.match.matcher import Matcher  # noqa: E402
 from scenicq.match.options import MatchOptions  # noqa: E402
 from scenicq.match.problem.outcome import Undecided, finish  # noqa: E402
-from scenicq.match.search import backtracking, group_cache, group_plan, label_search  # noqa: E402
+from scenicq.match.search import backtracking, first_fit, group_cache, group_plan, label_search  # noqa: E402
 from scenicq.match.search.first_fit import FirstFit  # noqa: E402
 from scenicq.match.tolerance import Tolerance  # noqa: E402
 from scenicq.store.labels import Label, LabelObject  # noqa: E402
@@ -141,6 +141,7 @@ STEPS: dict[str, Off] = {
     "most constrained first": _set(backtracking, "_order", lambda slots, *_: sorted(slots, key=lambda s: s.name)),
     "answers kept": _set(group_cache.GroupCache, "of", _anew),
     "first fit": _set(FirstFit, "fill", lambda *_: iter(())),
+    "forms of others": _set(first_fit, "others_form_of", lambda *_: None),
     "closed forms": _set(group_plan, "closed_form_of", lambda *_: None),
     "arc consistency": _set(label_search, "arc_consistent", lambda plan, candidates, *_: (candidates, None)),
     "subgroups": _set(group_plan, "subgroups_of", lambda *_: ()),

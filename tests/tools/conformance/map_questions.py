@@ -25,7 +25,7 @@ from published_scenes import maps_of
 from run_conformance import SCENIC, read_map
 
 from scenicq.compiler.attributes import attribute
-from scenicq.compiler.element_lookups import LOOKUPS, LookupTable
+from scenicq.compiler.element_lookups import LookupTable
 from scenicq.compiler.interpreter import Interpreter
 from scenicq.errors import ScenarioError, Source, Span
 from scenicq.forest import build
@@ -76,7 +76,7 @@ class Tally:
 def compare_points(network: Network, answers: list[dict[str, Any]], tally: Tally) -> None:
     """Directions and look-ups at points."""
     directions = network.roadDirection.values_many(np.array([(each["x"], each["y"]) for each in answers]))
-    tables = {name: LookupTable(name, *_layers(network, name)) for name in NETWORK_LOOK_UPS}
+    tables = {name: LookupTable.of_network(network, name) for name in NETWORK_LOOK_UPS}
     for each, allowed in zip(answers, directions, strict=True):
         place = f"({each['x']:.3f}, {each['y']:.3f})"
         own = each["direction"]
@@ -89,11 +89,6 @@ def compare_points(network: Network, answers: list[dict[str, Any]], tally: Tally
             tally.note(name, each[name] in found, f"{place}: {each[name]}, here {found}")
             known = plain(getattr(network, name)(each["x"], each["y"]))
             tally.note(f"{name} of a known place", each[name] == known, f"{place}: {each[name]}, here {known}")
-
-
-def _layers(network: Network, name: str) -> tuple[str, Any]:
-    family, layers = LOOKUPS[name]
-    return family, layers(network)
 
 
 def compare_elements(network: Network, answers: list[dict[str, Any]], tally: Tally) -> None:

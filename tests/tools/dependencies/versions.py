@@ -54,6 +54,8 @@ COMMANDS = (
     "check SAMPLES/scenarios/02_crossing_cars.scenic TOWN --forest",
     "explain SAMPLES/scenarios/02_crossing_cars.scenic TOWN 03-busy-intersection/10 --exit-zero",
     "show TOWN 03-busy-intersection/10",
+    "show TOWN 03-busy-intersection/10 --scenario SAMPLES/scenarios/02_crossing_cars.scenic -o frame.html",
+    "evaluate SAMPLES/parked/parked_car.scenic parked --predictions SAMPLES/parked/predictions.jsonl --report pages",
     "sample SAMPLES/scenarios/02_crossing_cars.scenic TOWN --seed 1 -n 2",
     "index town -q",
     "match",
@@ -139,6 +141,8 @@ def answers(bin_: Path, folder: Path, town: Path) -> dict[str, object]:
         found[line] = (done.returncode, done.stdout, told)
     done = run(bin_ / "python", "-I", "-c", SQL, town, cwd=folder, env=environment)
     found["SQL and matches in Python"] = (done.returncode, done.stdout, done.stderr)
+    for page in ("frame.html", "pages/index.html"):
+        found[page] = (folder / page).read_bytes() if (folder / page).exists() else None
     # names of a dataset's files tell their bytes; there is one file a table
     files = {file.parent.name: file for file in sorted((folder / "town").rglob("*.parquet"))}
     for name, file in {"lanes.parquet": folder / "lanes.parquet", **files}.items():

@@ -12,7 +12,7 @@ import pytest
 import shapely
 from drawing import draw_scene
 
-from scenicq.compiler.element_lookups import LOOKUPS, Lookups
+from scenicq.compiler.element_lookups import LOOKUPS, Lookups, LookupTable
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import ScenarioError, Source
 from scenicq.forest.nodes import Constant, DirectionAt, PointIn
@@ -235,8 +235,7 @@ def test_cells_hold_every_point_with_its_option(lookup: str) -> None:
 def test_what_is_found_is_what_the_map_says() -> None:
     lookups = Lookups()
     for name in ("laneAt", "roadAt", "laneGroupAt", "intersectionAt", "sidewalkAt", "crossingAt", "elementAt"):
-        family, layers = LOOKUPS[name]
-        table = lookups.table(name, name, family, lambda layers=layers: layers(network()))
+        table = lookups.table(name, lambda name=name: LookupTable.of_network(network(), name))
         for x, y in np.random.default_rng(2).uniform(-40, 40, (200, 2)).tolist():
             known = getattr(network(), name)(x, y)
             found = [(*table.options, None)[number] for number in table.occupancy.at(x, y)]

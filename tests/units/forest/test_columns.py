@@ -15,6 +15,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from expressions import expressions
 from test_intervals import observing
 
+from scenicq.errors import CannotEvaluate
 from scenicq.forest import build
 from scenicq.forest.column_domain import ColumnDomain
 from scenicq.forest.columns import (
@@ -28,7 +29,6 @@ from scenicq.forest.columns import (
     constant_column,
     truth_of,
 )
-from scenicq.forest.compute import CannotEvaluate
 from scenicq.forest.evaluate import evaluate
 from scenicq.forest.interpret import interpret, steps_of
 from scenicq.forest.nodes import (

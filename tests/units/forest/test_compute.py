@@ -8,7 +8,8 @@ from contextlib import suppress
 
 import pytest
 
-from scenicq.forest.compute import CannotEvaluate, compute, directions
+from scenicq.errors import CannotEvaluate
+from scenicq.forest.compute import compute, directions
 from scenicq.forest.kinds import kind_of_value
 from scenicq.forest.nodes import (
     Arithmetic,

@@ -13,7 +13,9 @@ from shapely.geometry import LineString, Point, Polygon, box
 
 from scenicq.geometry.angles import distance
 from scenicq.geometry.cell_guards import Nearer, Within, half_planes, narrowed
+from scenicq.geometry.directed_areas import rotated
 from scenicq.geometry.fields import VectorField
+from scenicq.geometry.followed_direction import OFF_ROAD, FollowedDirection
 from scenicq.geometry.road_direction import DirectedLane, RoadDirection, along_lines
 
 NORTH, WEST, SOUTH, EAST = 0.0, math.pi / 2, math.pi, -math.pi / 2
@@ -221,3 +223,30 @@ def test_a_line_against_the_traffic_is_turned_around() -> None:
     line = LineString([(4, 15), (4, 5)])
     assert list(direction.forward(line).coords) == [(4, 5), (4, 15)]
     assert direction.forward(line.reverse()).equals_exact(line.reverse(), 0)
+
+
+@settings(max_examples=60, deadline=None)
+@given(fields(), st.integers(0, 10_000))
+def test_a_step_along_a_lane_is_found_backwards(field: RoadDirection, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    paved = tuple(one.area for one in field.lanes)
+    followed = FollowedDirection(field.lanes, base=field, paved=paved)
+    begin = rng.uniform(-15, 15, size=(12, 2))
+    steps = np.column_stack([rng.uniform(-1, 1, 12), rng.uniform(-6, 6, 12)])
+    for one in (field, followed):
+        pairs = [(n, heading) for n, found in enumerate(one.values_many(begin)) for heading in found]
+        if not pairs:
+            continue
+        owner, turns = np.array([n for n, _ in pairs]), np.array([heading for _, heading in pairs])
+        ends = begin[owner] + rotated(steps[owner], turns)
+        place, heading, back = one.steps_to(ends, steps[owner])
+        again = back + rotated(steps[owner][place], heading)
+        assert np.allclose(again, ends[place], atol=1e-9), "each leads to where it is asked for"
+        for n, (x, y) in enumerate(begin[owner].tolist()):
+            # beside lanes a way may begin where the nearest lane's direction is: that is not looked for
+            within = any(area.covers(Point(x, y)) for area in paved)
+            free = one is followed and turns[n] == OFF_ROAD and all(area.distance(Point(x, y)) > 0.06 for area in paved)
+            if within or free:
+                mine = place == n
+                near = np.hypot(*(back[mine] - (x, y)).T) < 1e-6
+                assert (near & (np.abs(heading[mine] - turns[n]) < 1e-6)).any(), (x, y, turns[n])

@@ -340,6 +340,34 @@ def update_and_kill(source: Path, target: Path, after: int, largest: int) -> Non
     assert run.returncode in (0, -9)
 
 
+def test_an_update_reads_recordings_whose_map_has_changed(tmp_path: Path) -> None:
+    """Each recording has a map of its own."""
+
+    def write(numbers: range, shifted: int | None = None) -> Path:
+        folder = write_source(tmp_path / "source", [])
+        street = json.loads(next((folder / "maps").glob("*.geojson")).read_text())
+        lines: list[str] = []
+        for number in numbers:
+            features = street["features"][number == shifted :]
+            (folder / "maps" / f"m{number}.geojson").write_text(json.dumps({**street, "features": features}))
+            lines += [line(f"r{number}", frame).replace('"crossroads"', f'"m{number}"') for frame in range(FRAMES)]
+        (folder / "labels.jsonl").write_text("".join(lines))
+        return folder
+
+    def updated(source: Path, name: str) -> int:
+        reused = ingest(source, tmp_path / "d", update=True, segment_objects=SEGMENT).reused
+        ingest(source, tmp_path / name, segment_objects=SEGMENT)
+        assert contents(tmp_path / "d") == contents(tmp_path / name)
+        return reused
+
+    assert updated(write(range(6)), "six") == 0
+    assert updated(write(range(8)), "eight") == 6
+    assert updated(write(range(8), shifted=3), "shifted") == 7
+    (tmp_path / "source" / "maps" / "m5.geojson").unlink()
+    assert updated(tmp_path / "source", "gone") == 7
+    assert updated(write(range(8), shifted=3), "again") == 7
+
+
 def test_an_update_copies_nothing_of_a_file_that_has_changed(tmp_path: Path) -> None:
     source = write_source(tmp_path / "source", ["a", "b"])
     ingest(source, tmp_path / "d")

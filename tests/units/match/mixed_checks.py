@@ -9,12 +9,12 @@ import zlib
 import bad_checks
 import built_in
 
-from scenicq.smt.formula import flatten
+from scenicq.smt.smtlib import to_smtlib
 
 
 def mood(problem):
     """What happens to a problem: its text decides."""
-    return zlib.crc32(repr(flatten(problem.constraint)).encode()) % 7
+    return zlib.crc32(to_smtlib(problem, 1e-3).encode()) % 7
 
 
 def check(problem, *, precision, timeout_s):

@@ -11,7 +11,7 @@ from left_to_solvers import leave_to_solvers
 from programs import HEADER, PROGRAMS
 from scenes import compiled, drawn, label_of
 
-from scenicq.forest.compute import CannotEvaluate
+from scenicq.errors import CannotEvaluate
 from scenicq.forest.scenario import BuiltIn
 from scenicq.match.decide import solver_step
 from scenicq.match.linear import linear_program
@@ -321,7 +321,7 @@ def test_what_geometry_cannot_tell_is_unknown(monkeypatch):
 @pytest.mark.usefixtures("no_search")
 def test_a_linear_program_without_an_answer_is_no_proof(monkeypatch):
     def fails(*_):
-        raise linear_program.NotLinear
+        raise linear_program.not_linear()
 
     monkeypatch.setattr(linear_program, "_solve", fails)
     scenario = compiled(HEADER + PROGRAMS["shared"])

@@ -22,13 +22,14 @@ import pytest
 from choices_definition import alike, random_program, random_trace
 from choices_definition import recording_of as recording_of_trace
 from comparisons import between, c, compared
+from formulas import Var, Variable
 from nudged_scenes import dataset_of
 from patchwork import SIDE, Beside, patchwork
 from programs import HEADER, PROGRAMS
 
 from scenicq.compiler.program import compile_scenario
-from scenicq.errors import Source
-from scenicq.forest.nodes import Constant, DirectionAt
+from scenicq.errors import CannotEvaluate, Source
+from scenicq.forest.nodes import ArithmeticOp, Constant, DirectionAt, LogicOp
 from scenicq.forest.show_modes import show_modes
 from scenicq.geometry.default_street import street
 from scenicq.geometry.regions import Disc, IntersectionOf, PolygonSet
@@ -55,18 +56,8 @@ from scenicq.smt.case_split import check_by_cases
 from scenicq.smt.command import SmtlibSolver
 from scenicq.smt.distance_terms import BoxTerms
 from scenicq.smt.enclosing import box_holds
-from scenicq.smt.formula import (
-    Disjunction,
-    Num,
-    Operator,
-    Problem,
-    Var,
-    Variable,
-    apply,
-    compare,
-    disjunction,
-)
-from scenicq.smt.region_membership import UnsupportedError
+from scenicq.smt.problem import Problem
+from scenicq.smt.terms import apply, compare, disjunction, number, parts
 from scenicq.smt.worker_solver import WorkerSolver
 from scenicq.store.dataset import Dataset, open_dataset
 from scenicq.store.labels import Label, LabelObject, Recording
@@ -307,24 +298,26 @@ class Lost:
 
     def check(self, problem: Problem, *, precision: float, timeout_s: float) -> Answer:
         """Decide a problem."""
-        if isinstance(problem.constraint, Disjunction):
+        if len(parts(LogicOp.OR, problem.constraint)) > 1:
             return NoAnswer("budget")
         return built_in.check(problem, precision=precision, timeout_s=timeout_s)
 
 
 def by_cases(stores: Stores, **_: object) -> Facts:
     """A question that is asked again case by case."""
-    either = disjunction([compare("<", Var("x"), Num(-1.0)), compare("<", Num(0.5), Var("x"))])
+    either = disjunction([compare("<", Var("x"), number(-1.0)), compare("<", number(0.5), Var("x"))])
     return fact(check_by_cases(Lost(), Problem((X,), either), precision=1e-3, timeout_s=5.0))
 
 
 def held_box(stores: Stores, **_: object) -> Facts:
     """Whether a region that is not convex may hold a box somewhere."""
     region = PolygonSet((polygon([(0, 0), (12, 0), (12, 5), (5, 5), (5, 12), (0, 12)]),), "ell")
-    terms = BoxTerms.of((apply(Operator.MUL, Num(9.0), Var("x")), Num(2.0)), Num(0.0), Num(1.0), Num(2.0))
+    terms = BoxTerms.of(
+        (apply(ArithmeticOp.MUL, number(9.0), Var("x")), number(2.0)), number(0.0), number(1.0), number(2.0)
+    )
     try:
         formula = box_holds(terms, region, ((0.0, 9.0), (2.0, 2.0)))
-    except UnsupportedError:
+    except CannotEvaluate:
         return fact(NoAnswer("unsupported"))
     return fact(built_in.check(Problem((X,), formula), precision=1e-3, timeout_s=5.0))
 
@@ -332,7 +325,7 @@ def held_box(stores: Stores, **_: object) -> Facts:
 def worker(stores: Stores, **_: object) -> Facts:
     """A question to a solver in a process of its own."""
     with WorkerSolver("built_in:check") as solver:
-        answer = solver.check(Problem((X,), compare("<", Var("x"), Num(0.5))), precision=1e-3, timeout_s=20.0)
+        answer = solver.check(Problem((X,), compare("<", Var("x"), number(0.5))), precision=1e-3, timeout_s=20.0)
     return (
         {("question",): "match" if isinstance(answer, Sat) else "unknown"} if isinstance(answer, Sat | NoAnswer) else {}
     )
@@ -342,7 +335,7 @@ def command(stores: Stores, **_: object) -> Facts:
     """A question to a solver that is a command."""
     script = "import sys; sys.stdin.read(); print('sat'); print('((x 0.25))')"
     with SmtlibSolver(f'{sys.executable} -c "{script}"') as solver:
-        answer = solver.check(Problem((X,), compare("<", Var("x"), Num(0.5))), precision=1e-3, timeout_s=20.0)
+        answer = solver.check(Problem((X,), compare("<", Var("x"), number(0.5))), precision=1e-3, timeout_s=20.0)
     return (
         {("question",): "match" if isinstance(answer, Sat) else "unknown"} if isinstance(answer, Sat | NoAnswer) else {}
     )

@@ -191,6 +191,33 @@ def test_frames_are_those_of_the_definition(drawn: Drawn, condition: str) -> Non
     assert seen[False]
 
 
+ASKED = {
+    "any": "any({} for c in others(Object))", "filtered": "len([c for c in others(Object) if {}]) == 1",
+    "all": "all({} for c in others(Object))", "not all": "not any(not ({}) for c in others(Object))",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("form", ASKED)
+@pytest.mark.one_in(8)
+def test_of_others_as_much_is_known_as_of_roles(drawn: Drawn, form: str) -> None:
+    head = HEAD.replace("along,", "along, others,").split("\nc = ")[0]
+    for condition in CONDITIONS:
+        if "along(c" in condition:
+            continue  # what is no role has no course
+        found = _found(drawn.dataset, f"{head}\nrequire {ASKED[form].format(condition)}\n")
+        for frame, truth in drawn.truths(condition).items():
+            assert found.get(frame, False) is truth, (condition, frame, drawn.frames[frame])
+
+
+@pytest.mark.slow
+def test_of_others_as_much_is_known_over_time(drawn: Drawn) -> None:
+    head = HEAD.replace("along,", "along, others,").split("\nc = ")[0]
+    text = f"{head}\nrequire always any(0 < along(ego, c) < 20 for c in others(Object))\n"
+    found = _found(drawn.dataset, text, time=IntervalOptions(intervals="all"))
+    for frame, truth in drawn.truths("0 < along(ego, c) < 20").items():
+        assert (found.get(frame) is True) == (truth is True)
+
+
 @pytest.mark.parametrize("method", ["smt", "monolithic"])
 @pytest.mark.one_in(4)
 @pytest.mark.slow

@@ -29,7 +29,7 @@ from scenicq.errors import ScenicqError
 from scenicq.limits import LIMITS, limits
 from scenicq.query.execution.lazy_solver import LazySolver
 from scenicq.smt.answer import Answer
-from scenicq.smt.formula import Problem
+from scenicq.smt.problem import Problem
 
 LEAST = {
     "heading_width": math.inf, "shared_width": math.inf, "advice_runs": 1, "brief_runs": 1, "advice_maps": 1,

@@ -8,7 +8,7 @@ import sys
 import time
 
 from scenicq.smt.answer import Answer, NoAnswer, Sat, Unsat
-from scenicq.smt.formula import Problem
+from scenicq.smt.problem import Problem
 
 VERSION = "7.0"
 

@@ -6,20 +6,14 @@ import time
 
 import pytest
 from built_in import check
+from formulas import Var, Variable
 
+from scenicq.forest.nodes import Logic, LogicOp
+from scenicq.forest.walk import postorder
 from scenicq.smt.answer import Answer, NoAnswer, Sat, Unsat
 from scenicq.smt.case_split import cases, check_by_cases
-from scenicq.smt.formula import (
-    Disjunction,
-    Formula,
-    Problem,
-    Var,
-    Variable,
-    compare,
-    conjunction,
-    disjunction,
-    postorder,
-)
+from scenicq.smt.problem import Formula, Problem
+from scenicq.smt.terms import compare, conjunction, disjunction
 
 X, Y = Var("x"), Var("y")
 VARIABLES = (Variable("x", 0.0, 100.0), Variable("y", 0.0, 100.0))
@@ -53,9 +47,8 @@ class Lost:
     def check(self, problem: Problem, *, precision: float, timeout_s: float) -> Answer:
         self.asked.append(timeout_s)
         time.sleep(self.nap_s)
-        widest = max(
-            (len(node.args) for node in postorder(problem.constraint) if isinstance(node, Disjunction)), default=0
-        )
+        ors = (n for n in postorder((problem.constraint,)) if isinstance(n, Logic) and n.op is LogicOp.OR)
+        widest = max((len(node.args) for node in ors), default=0)
         if widest > self.most:
             return NoAnswer(self.reason)
         return check(problem, precision=precision, timeout_s=timeout_s)

@@ -6,13 +6,12 @@ import math
 
 import numpy as np
 import pytest
+from formulas import Var, evaluate
 from shapely import Polygon, box
 
 from scenicq.geometry.angles import distance
 from scenicq.geometry.road_direction import DirectedLane, RoadDirection
-from scenicq.smt.evaluation import evaluate
 from scenicq.smt.field import field_cells
-from scenicq.smt.formula import Var
 
 WIDE = 14.0
 

@@ -9,31 +9,20 @@ import threading
 from pathlib import Path
 
 import pytest
+from formulas import Var, Variable, evaluate
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from scenicq.errors import SolverError
+from scenicq.forest.nodes import ArithmeticOp
 from scenicq.smt import command
 from scenicq.smt.answer import Answer, NoAnswer, Sat, Unsat
 from scenicq.smt.command import SmtlibSolver
-from scenicq.smt.evaluation import evaluate
-from scenicq.smt.formula import (
-    TRUE,
-    Formula,
-    Num,
-    Operator,
-    Problem,
-    Term,
-    Var,
-    Variable,
-    apply,
-    compare,
-    conjunction,
-    disjunction,
-)
+from scenicq.smt.problem import Formula, Problem, Term
 from scenicq.smt.smtlib import read_reply, to_smtlib
+from scenicq.smt.terms import TRUE, apply, compare, conjunction, disjunction, number
 
-Fn = Operator
+Fn = ArithmeticOp
 X, Y = Var("x"), Var("y")
 ONE = Problem((Variable("x"),), TRUE)
 
@@ -164,7 +153,7 @@ POINTS = st.fixed_dictionaries(
 @st.composite
 def polynomials(draw: st.DrawFn) -> Formula:
     """Small formulas over sums, products, extremes and quotients."""
-    terms: list[Term] = [X, Y, Num(draw(st.integers(-4, 4)) / 2.0)]
+    terms: list[Term] = [X, Y, number(draw(st.integers(-4, 4)) / 2.0)]
     for _ in range(draw(st.integers(1, 5))):
         operator = draw(st.sampled_from((Fn.ADD, Fn.SUB, Fn.MUL, Fn.MIN, Fn.MAX, Fn.DIV, Fn.ABS, Fn.NEG)))
         one, two = draw(st.sampled_from(terms)), draw(st.sampled_from(terms))

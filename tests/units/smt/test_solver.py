@@ -6,15 +6,16 @@ import subprocess
 import sys
 
 import pytest
+from formulas import Var, Variable
 
 from scenicq.errors import SolverError
 from scenicq.smt import solver as module
 from scenicq.smt.answer import Sat, SolverStatus
-from scenicq.smt.formula import Problem, Variable, compare
-from scenicq.smt.formula import Var as V
+from scenicq.smt.problem import Problem
 from scenicq.smt.solver import available, open_solver
+from scenicq.smt.terms import compare
 
-PROBLEM = Problem((Variable("x", 0.0, 4.0),), compare(">=", V("x"), 3.0))
+PROBLEM = Problem((Variable("x", 0.0, 4.0),), compare(">=", Var("x"), 3.0))
 
 
 @pytest.fixture

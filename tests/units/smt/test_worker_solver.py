@@ -13,11 +13,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from formulas import Variable
 
 from scenicq.budget import limited, waiting
 from scenicq.errors import SolverError
 from scenicq.smt.answer import Answer, NoAnswer, Sat, Unsat
-from scenicq.smt.formula import TRUE, Problem, Variable
+from scenicq.smt.problem import Problem
+from scenicq.smt.terms import TRUE
 from scenicq.smt.worker import read_answer, write_answer
 from scenicq.smt.worker_solver import WorkerSolver
 
@@ -148,7 +150,9 @@ def _alive(pid: int) -> bool:
 ORPHAN = """
 import sys, threading, time
 sys.path[:] = {path!r}
-from scenicq.smt.formula import TRUE, Problem, Variable
+from formulas import Variable
+from scenicq.smt.problem import Problem
+from scenicq.smt.terms import TRUE
 from scenicq.smt.worker_solver import WorkerSolver
 solver = WorkerSolver("fake_checks:behave")
 answer = solver.check(Problem((Variable("pid", 0.0, 1e9),), TRUE), precision=1.0, timeout_s=9.0)

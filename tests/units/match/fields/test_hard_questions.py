@@ -6,27 +6,16 @@ import math
 
 import pytest
 from built_in import check
+from formulas import Var, Variable, evaluate, value
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from scenicq.forest.nodes import Arithmetic, ArithmeticOp
 from scenicq.smt.answer import NoAnswer, Sat, Unsat
-from scenicq.smt.evaluation import Evaluator, evaluate, holds
-from scenicq.smt.formula import (
-    Formula,
-    Num,
-    Op,
-    Operator,
-    Problem,
-    Term,
-    Var,
-    Variable,
-    apply,
-    compare,
-    conjunction,
-    disjunction,
-)
+from scenicq.smt.problem import Formula, Problem, Term, holds
+from scenicq.smt.terms import apply, compare, conjunction, disjunction, number
 
-Fn = Operator
+Fn = ArithmeticOp
 X, Y = Var("x"), Var("y")
 COORDINATES = st.sampled_from((0.0, 1.0, -1.0)) | st.floats(-4, 4)
 BINARY = (Fn.ADD, Fn.SUB, Fn.MUL, Fn.DIV, Fn.MIN, Fn.MAX, Fn.ATAN2)
@@ -36,16 +25,16 @@ UNARY = (Fn.NEG, Fn.ABS, Fn.SQRT, Fn.SIN, Fn.COS, Fn.TAN, Fn.ASIN, Fn.ACOS, Fn.A
 @st.composite
 def terms(draw: st.DrawFn) -> Term:
     """Terms of a few operators, of every kind."""
-    known: list[Term] = [X, Y, Num(draw(st.sampled_from((0.0, 1.0, 0.5, -3.0, math.pi)) | st.floats(-3, 3)))]
+    known: list[Term] = [X, Y, number(draw(st.sampled_from((0.0, 1.0, 0.5, -3.0, math.pi)) | st.floats(-3, 3)))]
     for _ in range(draw(st.integers(1, 6))):
         one, two = draw(st.sampled_from(known)), draw(st.sampled_from(known))
         kind = draw(st.sampled_from(("unary", "binary", "power")))
         if kind == "power":
-            known.append(Op(Fn.POW, (one, Num(float(draw(st.integers(-2, 4)))))))
+            known.append(Arithmetic(Fn.POW, (one, number(float(draw(st.integers(-2, 4)))))))
         elif kind == "binary":
-            known.append(Op(draw(st.sampled_from(BINARY)), (one, two)))
+            known.append(Arithmetic(draw(st.sampled_from(BINARY)), (one, two)))
         else:
-            known.append(Op(draw(st.sampled_from(UNARY)), (one,)))
+            known.append(Arithmetic(draw(st.sampled_from(UNARY)), (one,)))
     return known[-1]
 
 
@@ -56,10 +45,10 @@ def satisfied(draw: st.DrawFn) -> tuple[Formula, dict[str, float]]:
     parts: list[Formula] = []
     for _ in range(draw(st.integers(1, 3))):
         term = draw(terms())
-        value = Evaluator(term)(point)
-        assume(math.isfinite(value) and abs(value) < 1e6)
-        slack = 1e-9 * max(1.0, abs(value))
-        upper, lower = compare("<=", term, value + slack), compare(">=", term, value - slack)
+        there = value(term, point)
+        assume(math.isfinite(there) and abs(there) < 1e6)
+        slack = 1e-9 * max(1.0, abs(there))
+        upper, lower = compare("<=", term, there + slack), compare(">=", term, there - slack)
         other = compare("<=", draw(terms()), draw(st.floats(-3, 3)))
         both = conjunction([upper, lower])
         parts.append(
@@ -110,8 +99,8 @@ def test_deep_terms() -> None:
     term: Term = X
     for _ in range(5000):
         term = apply(Fn.SIN, apply(Fn.ADD, term, 0.1))
-    value = Evaluator(term)({"x": 0.5})
-    problem = Problem((Variable("x", 0.0, 1.0),), compare("<=", term, value + 1e-3))
+    there = value(term, {"x": 0.5})
+    problem = Problem((Variable("x", 0.0, 1.0),), compare("<=", term, there + 1e-3))
     assert isinstance(check(problem, precision=1e-3, timeout_s=20.0), Sat)
 
 

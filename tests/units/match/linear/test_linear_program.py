@@ -8,9 +8,10 @@ import random
 import pytest
 from shapely import Polygon, box
 
+from scenicq.errors import CannotEvaluate
 from scenicq.forest.nodes import Identity
 from scenicq.match.linear.affine_forms import Affine
-from scenicq.match.linear.linear_program import LinearSystem, NotLinear, Row
+from scenicq.match.linear.linear_program import LinearSystem, Row
 
 X, Y = (Identity(), 0), (Identity(), 0)
 WIDE = 50.0
@@ -99,7 +100,7 @@ def test_a_row_without_variables_holds_or_does_not(low, high, holds, strict):
 def test_a_system_that_nothing_holds_has_no_extent_and_an_unbounded_one_is_not_solved():
     never = [Row(form(1, 1), 200.0, math.inf)]
     assert LinearSystem(FRAME).extent(never, X) is None
-    with pytest.raises(NotLinear):
+    with pytest.raises(CannotEvaluate):
         LinearSystem([Row(form(1, 1), 0.0, 1.0)]).extent([], X)
-    with pytest.raises(NotLinear):
+    with pytest.raises(CannotEvaluate):
         LinearSystem([FRAME[0]]).extent([], Y)

@@ -9,10 +9,10 @@ import pytest
 from comparisons import c, compared
 from shapely import LineString
 
+from scenicq.errors import CannotEvaluate
 from scenicq.forest.nodes import PointIn
 from scenicq.geometry.membership import contains
 from scenicq.geometry.regions import IntersectionOf, PolylineSet, Sector
-from scenicq.match.linear.linear_program import NotLinear
 from scenicq.match.linear.linear_relaxation import solve_affine
 from scenicq.match.tolerance import parse_tolerance
 
@@ -24,7 +24,7 @@ def answer(region, place):
     """Whether a point of the region lies at a place: None where the linear programs do not tell."""
     try:
         return solve_affine([compared("position", PointIn(c(region)), place)], [], NEAR) is not None
-    except NotLinear:
+    except CannotEvaluate:
         return None
 
 

@@ -7,7 +7,8 @@ import pytest
 from scenicq.errors import SolverError
 from scenicq.query.execution.lazy_solver import LazySolver
 from scenicq.smt.answer import Sat
-from scenicq.smt.formula import TRUE, Problem
+from scenicq.smt.problem import Problem
+from scenicq.smt.terms import TRUE
 
 
 def test_nothing_is_opened_before_the_first_question():

@@ -32,6 +32,9 @@ PROGRAMS = {
     "on a crossing": "ego = new Car\nother = new Car on crossing",
     "at a hidden spot": "spot = new OrientedPoint on road\nego = new Car\nother = new Car ahead of spot by Range(0, 9)",
     "recorded": "ego = new Car\nother = new Car ahead of ego by Range(0, 9)\nrecord (distance to other) as gap",
+    "ahead in the lane": "ego = new Car\nother = new Car on ego.lane, facing Range(-9, 9) deg\n"
+    "require (distance to other) < 19",
+    "in one lane": "ego = new Car\nother = new Car\nrequire other.lane is ego.lane",
     "comes near": "ego = new Car\nother = new Car\nrequire eventually (distance to other) < 12",
 }
 
@@ -81,6 +84,12 @@ def _dataset(folder, numbers, named=lambda number: f"map{number}"):
     return open_dataset(folder / "dataset")
 
 
+@pytest.fixture(autouse=True)
+def kept(monkeypatch):
+    """Few maps are many."""
+    monkeypatch.setattr(run, "MAPS_KEPT", 2)
+
+
 @pytest.fixture(scope="module")
 def alone(tmp_path_factory):
     folder = tmp_path_factory.mktemp("alone")
@@ -125,8 +134,10 @@ def test_a_map_for_every_recording_gives_what_each_map_alone_does(alone, togethe
     assert expected[0]
 
 
-@pytest.mark.parametrize("program", ["beside the ego", "along the road", "in the lane"])
-@pytest.mark.one_in(3)
+@pytest.mark.parametrize(
+    "program", ["beside the ego", "along the road", "in the lane", "ahead in the lane", "in one lane"]
+)
+@pytest.mark.one_in(5)
 def test_frames_that_nobody_reads_proofs_of_are_the_same(alone, together, program):
     options = read_options(model=DRIVING)
     options = replace(options, proofs=False, reasons=False, interval_reasons=False)
@@ -166,6 +177,29 @@ def test_maps_are_read_when_a_candidate_needs_one(together, monkeypatch):
     assert len(read) == len(set(read))
 
 
+@pytest.mark.parametrize("program", ["ahead in the lane", "in one lane"])
+def test_elements_at_places_are_told_by_relations(together, monkeypatch, program):
+    read: list[str] = []
+    features = MapFiles.features
+    monkeypatch.setattr(MapFiles, "features", lambda self, name: read.append(name) or features(self, name))
+    ids = replace(read_options(model=DRIVING), proofs=False, reasons=False)
+    assert [each.frame for each in Query(together, Source("p", PROGRAMS[program]), ids).results()]
+    # few maps have crossings, or no lanes
+    assert set(read) <= {f"map{CROSSING}", f"map{WITHOUT_LANES}"}
+
+
+def test_one_query_over_time_is_asked_of_all_maps_that_are_alike(together, monkeypatch):
+    asked: list[str] = []
+    for name in ("run_players", "run_prefilter"):
+        run_it = getattr(block_matcher, name)
+        monkeypatch.setattr(block_matcher, name, lambda *given, run_it=run_it: asked.append("") or run_it(*given))
+    source = Source("p", PROGRAMS["comes near"])
+    results = list(Query(together, source, read_options(model=DRIVING)).results())
+    assert len({each.recording for each in results}) > 2
+    # the first two are alike, the last two, and no others that follow each other
+    assert len(asked) <= 5 < COUNT
+
+
 @pytest.mark.slow
 def test_a_dataset_that_says_nothing_of_its_maps_is_asked_alike(together, tmp_path):
     earlier = _dataset(tmp_path / "earlier", range(COUNT))
@@ -200,7 +234,6 @@ def test_networks_go_with_the_maps_that_are_not_kept(together, monkeypatch):
         made.append(weakref.ref(self))
 
     monkeypatch.setattr(Network, "__init__", noted)
-    monkeypatch.setattr(run, "MAPS_KEPT", 2)
     monkeypatch.setattr(block_matcher, "MAPS_KEPT", 2)
     gc.collect()
     gc.disable()

@@ -1,4 +1,4 @@
-"""How many frames match by a tolerance alone: those that the same query leaves out with it exact."""
+"""How many matches there are by a tolerance alone: those that the same query leaves out with it exact."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def matching(dataset, program, tolerance):
     program = program.format(reach=reach_of(dataset))
     options = QueryOptions(MatchOptions(tolerance=parse_tolerance(tolerance)))
     query = Query(dataset, Source("p.scenic", MODEL + program), options)
-    return query, {each.frame for each in query.results() if isinstance(each.verdict, Match)}
+    return query, [each for each in query.results() if isinstance(each.verdict, Match)]
 
 
 @pytest.mark.parametrize(("name", "what"), [
@@ -52,16 +52,31 @@ def test_it_counts_what_an_exact_part_leaves_out(crossroads, name, what):
     dataset = open_dataset(crossroads)
     given, exact = TOLERANCES[what]
     query, found = matching(dataset, PROGRAMS[name], given)
-    left = found - matching(dataset, PROGRAMS[name], exact)[1]
-    share = by_tolerance_alone(query, sorted(found), math.inf)
-    assert share.frames == len(found) > 0
+    kept = {each.frame for each in matching(dataset, PROGRAMS[name], exact)[1]}
+    left = {each.frame for each in found} - kept
+    share = by_tolerance_alone(query, found, math.inf)
+    assert share.matches == len(found) > 0
     assert (share.headings if what == "headings" else share.positions) == len(left)
     assert bool(left) == (name != "no places")
 
 
 def test_there_may_be_no_time(crossroads):
     query, found = matching(open_dataset(crossroads), PROGRAMS["an edge"], "0.3")
-    assert by_tolerance_alone(query, sorted(found), 0.0) == ToleranceShare(0, 0, 0)
+    assert by_tolerance_alone(query, found, 0.0) == ToleranceShare(0, 0, 0)
+
+
+def test_an_interval_counts_by_its_first_frame(crossroads):
+    dataset = open_dataset(crossroads)
+    over_time = PROGRAMS["an edge"] + "require eventually lead.speed > -1\nterminate after 1 seconds\n"
+    (given, exact), alone = TOLERANCES["positions"], 0
+    query, found = matching(dataset, over_time, given)
+    begin = {(each.frame, each.verdict.correspondence["lead"]) for each in found}
+    starts = {(each.frame, each.verdict.correspondence["lead"]) for each in matching(dataset, over_time, exact)[1]}
+    share = by_tolerance_alone(query, found, math.inf)
+    assert share.matches == len(found) > 0
+    # one that is left out may begin where another one of the longer query does not
+    alone = len(begin - starts)
+    assert 0 < share.positions <= alone
 
 
 @pytest.mark.parametrize("rest", [[], ["--tolerance", "exact"]])
@@ -70,6 +85,8 @@ def test_the_summary_tells_it(run, crossroads, tmp_path, rest):
     (tmp_path / "p.scenic").write_text(MODEL + program)
     told = run("match", tmp_path / "p.scenic", crossroads, "--summary", *rest).stderr
     assert ("by a tolerance alone" in told) == (not rest)
+    told = run("match", tmp_path / "p.scenic", crossroads, "--summary", "--min-duration", "0.1", *rest).stderr
+    assert ("at their first frames" in told) == (not rest)
 
 
 def test_the_summary_tells_what_directions_of_the_model_leave_out(run, crossroads, tmp_path):

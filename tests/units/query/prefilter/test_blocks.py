@@ -53,6 +53,20 @@ def test_blocks_with_runs_keep_them():
     assert joined(pieces(whole), 9) == [whole]
 
 
+def test_recordings_on_several_maps_keep_theirs():
+    runs, maps = ((0, 4), (4, 7), (7, 9), (9, 12)), ("a", "a", "b", "c")
+    whole = Block("a", 0, 0, 12, None, runs, maps)
+    assert [(each.map, each.runs) for each in pieces(whole)] == [
+        (name, (run,)) for name, run in zip(maps, runs, strict=True)
+    ]
+    assert joined(pieces(whole), 12) == [whole]
+    assert whole.by_map() == [
+        Block("a", 0, 0, 7, None, runs[:2]),
+        Block("b", 0, 7, 9, None, runs[2:3]),
+        Block("c", 0, 9, 12, None, runs[3:]),
+    ]
+
+
 @pytest.mark.parametrize(
     "other",
     [

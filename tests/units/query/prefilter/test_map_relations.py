@@ -6,6 +6,7 @@ import itertools
 import math
 import random
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,12 +18,14 @@ from scenicq.errors import ScenarioError, Source
 from scenicq.forest.evaluate import evaluate
 from scenicq.forest.nodes import GOING, LAST_LANE, Constant, Index, Node, PointIn, Select
 from scenicq.forest.walk import leaves
+from scenicq.geometry.abstract_map import AbstractNetwork
 from scenicq.geometry.regions import PolygonSet
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.preprocess import ready
 from scenicq.match.tolerance import EXACT, parse_tolerance
 from scenicq.match.verdict import Match, NoMatch
+from scenicq.query.execution import run
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.query.prefilter.map_relations import MapRelations
 from scenicq.query.prefilter.regions import RegionNames
@@ -123,6 +126,20 @@ def dataset(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
     folder = tmp_path_factory.mktemp("relations") / "d"
     made = labels(random.Random(3), 150)
     write_dataset(folder, iter([Recording("r", STREET.name, tuple(made))]), {STREET.name: STREET.features}, name="d")
+    return open_dataset(folder)
+
+
+@pytest.fixture(scope="module")
+def mapped(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
+    """The same with three maps that are alike."""
+    folder = tmp_path_factory.mktemp("mapped") / "d"
+    made = labels(random.Random(3), 150)
+    maps = [f"map{number}" for number in range(3)]
+    recordings = [
+        Recording(f"r{name}", name, tuple(replace(each, recording=f"r{name}", map=name) for each in made[number::3]))
+        for number, name in enumerate(maps)
+    ]
+    write_dataset(folder, iter(recordings), dict.fromkeys(maps, STREET.features), name="d")
     return open_dataset(folder)
 
 
@@ -244,6 +261,44 @@ def test_several_ask_for_one_element(tmp_path: Path, said: str):
 def test_sql_says_what_the_matcher_says(dataset: Dataset, rounds):
     seeds = (*range(rounds(32)), 27, 102, 164, 1306)
     assert sum(check(dataset, seed) for seed in seeds) > len(seeds)
+
+
+def abstract(dataset: Dataset, text: str) -> bool:
+    """Whether relations say all of the map that SQL asks for."""
+    try:
+        return isinstance(Query(dataset, Source("p.scenic", text)).planned_map("map0").network, AbstractNetwork)
+    except ScenarioError:
+        return False
+
+
+def test_sql_over_any_map_says_what_the_matcher_says(
+    mapped: Dataset, rounds: Callable[[int], int], monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(run, "MAPS_KEPT", 1)
+    seeds = (seed for seed in itertools.count() if abstract(mapped, question(random.Random(seed))))
+    assert sum(check(mapped, seed) for seed in itertools.islice(seeds, rounds(24))) > 0
+
+
+@pytest.mark.parametrize(
+    ("said", "known"),
+    [
+        ("other = new Car on ego.lane, facing Range(-9, 9) deg relative to ego.heading", True),
+        ("other = new Car\nrequire other.lane is ego.lane", True),
+        ("other = new Car\nrequire other.intersection is ego.intersection", True),
+        ("other = new Pedestrian on ego.crossing, facing Range(-180, 180) deg", True),
+        ("other = new Car on ego.lane.maneuvers[0].endLane", False),
+        ("other = new Car\nrequire (distance from other to ego.lane) < 3", False),
+        ("other = new Car on network.lanes[0]", False),
+        ("other = new Car on ego.laneGroup", False),
+        ("other = new Car\nrequire ego.lane.uid == 'lane1'", False),
+        ("other = new Car\nrequire ego.lane.orientation[ego.position] == other.lane.orientation[ego.position]", False),
+    ],
+)
+def test_relations_say_all_of_the_map_that_some_programs_ask_for(
+    mapped: Dataset, monkeypatch: pytest.MonkeyPatch, said: str, known: bool
+):
+    monkeypatch.setattr(run, "MAPS_KEPT", 1)
+    assert abstract(mapped, f"model scenic.domains.driving.model\nego = new Car\n{said}\n") is known
 
 
 @pytest.mark.slow

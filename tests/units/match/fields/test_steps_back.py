@@ -1,0 +1,104 @@
+"""Hidden points that are drawn by going backwards from what is observed: most of them lead there."""
+
+from __future__ import annotations
+
+import random
+
+import numpy as np
+import pytest
+from hidden_roads import BEND, BENDS, ON_BEND
+from scenes import compiled, drawn, label_of
+
+from scenicq.forest.column_domain import ColumnDomain
+from scenicq.match.fields import field_solver, witness_search
+from scenicq.match.fields.trials import TrialSpace
+from scenicq.match.fields.witness_search import QUICK, find_witness
+from scenicq.match.matcher import Matcher
+from scenicq.match.options import MatchOptions
+from scenicq.match.tolerance import parse_tolerance
+
+TIGHT = parse_tolerance("position=0.05,heading=0.5deg")
+FOLLOWERS = (
+    "new Car following roadDirection from spot for Range(5, 15)\n"
+    "new Car following roadDirection from spot for Range(20, 35)"
+)
+TWO = (
+    "model scenic.domains.driving.model\nspot = new OrientedPoint on road\n"
+    "ego = new Car following roadDirection from spot for Range(5, 15)\n"
+    "new Car following roadDirection from spot for Range(20, 35)"
+)
+BACK = {
+    **BENDS,
+    "aside": "new Car right of spot by 0.4, facing Range(16, 37) deg relative to spot.heading",
+    "two followers": FOLLOWERS,
+}
+"""Programs in which a hidden point follows from where a car is observed."""
+
+
+class Begun(Exception):
+    """A search begins: what comes after it does not matter here."""
+
+
+def spaces(text, monkeypatch, labels):
+    """What draws are made of, for some labels of a program."""
+    found = []
+
+    def begun(start, *_, **__):
+        found.append(TrialSpace(start))
+        raise Begun
+
+    with monkeypatch.context() as patched:
+        patched.setattr(field_solver, "find_witness", begun)
+        patched.setattr(witness_search, "find_witness", begun)
+        scenario = compiled(ON_BEND + text, BEND)
+        matcher = Matcher(scenario, MatchOptions(tolerance=TIGHT))
+        for seed in range(labels):
+            with pytest.raises(Begun):
+                matcher.match(label_of(scenario, drawn(scenario, seed), random.Random(seed)))
+    return found
+
+
+@pytest.mark.parametrize("name", BACK)
+def test_points_drawn_backwards_lead_to_what_is_observed(name, monkeypatch):
+    count, most = 60, 0
+    for space in spaces(BACK[name], monkeypatch, 2):
+        assert space.ways_back
+        for way in space.ways_back:
+            search = witness_search._Search(space, QUICK, (), witness_search.trials_left(), 0)
+            draws = search._anywhere(count)
+            way.draw(space, draws, np.arange(count), np.random.default_rng(1))
+            x, y = space.values(space._steps, draws)[id(way.end)].data
+            # a point to which no way of the distance drawn leads back stays where it was
+            there = np.hypot(x - way.seen[0], y - way.seen[1]) < 1e-6
+            most = max(most, np.count_nonzero(there))
+    assert most >= count / 2
+
+
+def test_two_followers_of_one_hidden_point_are_mostly_found_at_once(monkeypatch):
+    found = []
+
+    def noted(*given, **more):
+        found.append(find_witness(*given, **more))
+        raise Begun
+
+    monkeypatch.setattr(witness_search, "find_witness", noted)
+    scenario = compiled(TWO, BEND)
+    matcher = Matcher(scenario, MatchOptions(tolerance=TIGHT))
+    for seed in range(6):
+        with pytest.raises(Begun):
+            matcher.match(label_of(scenario, drawn(scenario, seed), random.Random(seed)))
+    assert sum(map(bool, found)) >= 4, "two of eight are found from draws that lie anywhere"
+
+
+def test_where_fields_are_known_to_point_they_are_not_asked(monkeypatch):
+    (space,) = spaces(FOLLOWERS, monkeypatch, 1)
+    search = witness_search._Search(space, QUICK, (), witness_search.trials_left(), 0)
+    tried = space.run(search._anywhere(20))
+
+    def asked(*_):
+        raise AssertionError("a field is asked")
+
+    monkeypatch.setattr(ColumnDomain, "_direction", asked)
+    again = space.run(tried.draws, tried.headings)
+    assert np.allclose(again.residuals.each, tried.residuals.each, equal_nan=True)
+    assert np.allclose(again.headings, tried.headings, equal_nan=True)
