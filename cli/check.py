@@ -28,6 +28,7 @@ from scenicq.query.execution.compiled_map import about_dataset, is_about_map, pr
 from scenicq.query.execution.never_compared import coverage
 from scenicq.query.execution.option_texts import QUERY_OPTIONS
 from scenicq.query.execution.program_files import SiblingFiles
+from scenicq.store.atomic_files import write_whole
 from scenicq.store.dataset import Dataset
 from scenicq.store.said_values import said_types
 
@@ -35,6 +36,7 @@ from .datasets import open_checked
 from .main import ERROR
 from .manual import Manual
 from .options import declared
+from .output import writing
 from .path_type import LOCAL_PATH
 from .programs import PROGRAM_TEXT, SCENARIO, given_program
 from .report import as_json, count, show
@@ -108,6 +110,43 @@ def _groups(scenario: Scenario) -> list[str]:
         f"{number}. " + ", ".join(describe_constraint(scenario, each) for each in group.constraints)
         for number, group in enumerate(groups, 1)
     ]
+
+
+@dataclass(slots=True)
+class _Drawing:
+    """Draws the modes of a program over the first map.
+
+    Attributes:
+        file: Where to.
+        is_done: Whether that has been done.
+    """
+
+    file: Path
+    is_done: bool = False
+
+    def __post_init__(self) -> None:
+        """Refuse what is no name of a picture.
+
+        Raises:
+            DataError: option-invalid.
+        """
+        if self.file.suffix.lower() != ".svg":
+            message = f"modes are drawn as SVG: {self.file} is no name for that"
+            raise DataError(Diagnostic("option-invalid", message, hints=("name a file as modes.svg",)))
+
+    def __call__(self, scenario: Scenario) -> list[str]:
+        """Draw, and say nothing.
+
+        Raises:
+            DataError: target-unwritable.
+        """
+        from scenicq.report.mode_picture import draw_modes  # noqa: PLC0415 - takes long to load
+
+        if not self.is_done:
+            self.is_done = True
+            with writing(self.file):
+                write_whole(self.file, draw_modes(scenario))
+        return []
 
 
 @dataclass(frozen=True, slots=True)
@@ -216,6 +255,8 @@ def _found(
     is_flag=True,
     help="Print the modes that monitors, behaviors and scenarios may be in, and where each leads.",
 )
+@click.option("--draw-modes", "drawing", metavar="FILE", type=LOCAL_PATH,
+              help="Draw these modes, and write them to a file: .svg.")  # fmt: skip
 @click.option("--groups", is_flag=True, help="Print the groups of jointly dependent constraints, in order.")
 @declared(QUERY_OPTIONS, "classes", help="Look at the program as `match` does with these classes.")
 @declared(QUERY_OPTIONS, "strict", help="What compiles but cannot be meant, or is never compared, is an error.")
@@ -229,7 +270,7 @@ def _found(
 @click.pass_context
 def check(ctx: click.Context, scenario: str | None, dataset: str | None, *, program: str | None,
           run_scenario: str | None, params: tuple[tuple[str, str], ...], map_file: Path | None, scenic: str | None,
-          map_defaults: bool, initial: bool, forest: bool, modes: bool, groups: bool,
+          map_defaults: bool, initial: bool, forest: bool, modes: bool, drawing: Path | None, groups: bool,
           classes: Literal["fine", "coarse"], strict: bool, format_: str) -> None:  # fmt: skip
     """Say whether a scenario is sound, and how it is read.
 
@@ -241,6 +282,8 @@ def check(ctx: click.Context, scenario: str | None, dataset: str | None, *, prog
     """
     lines: list[str] = []
     details: Details = [show_forest] * forest + [show_modes] * modes + [_groups] * groups
+    if drawing is not None:
+        details.append(_Drawing(drawing))
     try:
         read = read_values(QUERY_OPTIONS, {"scenic": scenic, "params": params})
         version, warnings = read["scenic"], list[Diagnostic]()

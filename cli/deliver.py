@@ -101,6 +101,7 @@ def _deliver(
                 ranked=wanted.ranked,
                 over_time=query.is_over_time(),
                 every=query.options.all_matches,
+                timelines=lambda: query.options.timelines and query.has_timelines(),
             )
         try:
             for result in itertools.chain(_kept(results, shown), _kept(near, close)):

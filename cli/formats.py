@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Callable, Collection, Mapping, Sequence
-from typing import Any, BinaryIO, Protocol, TextIO
+from typing import TYPE_CHECKING, Any, BinaryIO, Protocol, TextIO
 
 from msgspec import UNSET, structs
 
@@ -30,6 +30,9 @@ from scenicq.store.frame_names import ShortNames
 
 from .report import plain
 from .table import Table, TextStream
+
+if TYPE_CHECKING:
+    import pyarrow as pa
 
 __all__ = ["FORMATS", "SPREADSHEET_HELP", "CsvRows", "Writer", "make_writer"]
 
@@ -169,13 +172,10 @@ class _Csv:
 
 
 class _Parquet:
-    def __init__(self, sink: BinaryIO, roles: Sequence[str], origin: str, recorded: Sequence[RecordedColumn], *,
-                 ranked: bool, over_time: bool, every: bool) -> None:  # fmt: skip
+    def __init__(self, sink: BinaryIO, schema: pa.Schema) -> None:
         import pyarrow.parquet as pq  # noqa: PLC0415 - takes long to load
 
-        self._schema = result_schema(
-            roles, origin=origin, ranked=ranked, over_time=over_time, every=every, recorded=recorded
-        )
+        self._schema = schema
         self._file = pq.ParquetWriter(sink, self._schema)
         self._rows: list[Record] = []
 
@@ -209,6 +209,7 @@ def make_writer(
     ranked: bool = False,
     over_time: bool = False,
     every: bool = False,
+    timelines: Callable[[], bool] = bool,
 ) -> Writer:
     """Make the writer of a format.
 
@@ -222,16 +223,26 @@ def make_writer(
         ranked: Whether results have a density.
         over_time: Whether the results are intervals.
         every: Whether each correspondence by which a frame matches is a result.
+        timelines: Gives whether results say what roles do from when to when; asked where that is a column.
     """
     if name == "parquet":
-        return _Parquet(sink, roles(), origin, recorded(), ranked=ranked, over_time=over_time, every=every)
+        schema = result_schema(
+            roles(), origin=origin, ranked=ranked, over_time=over_time, every=every, recorded=recorded(),
+            timelines=timelines(),
+        )  # fmt: skip
+        return _Parquet(sink, schema)
     text = TextStream(sink)
     match name:
         case "table":
             return Table(text, shorten, over_time=over_time)
         case "csv" | "spreadsheet":
             columns = recorded()
-            absent = {"all_matches": every, "dataset": bool(origin), **dict.fromkeys(DENSITY, ranked)}
+            absent = {
+                "timeline": timelines(),
+                "all_matches": every,
+                "dataset": bool(origin),
+                **dict.fromkeys(DENSITY, ranked),
+            }
             absent |= dict.fromkeys(RECORDED, bool(columns))
             left_out = {name for name, there in absent.items() if not there}
             kind = IntervalRecord if over_time else FrameRecord

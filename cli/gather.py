@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import click
+from msgspec import UNSET
 
 from scenicq.exporters.forms import FORMS
 from scenicq.query.execution.option_texts import QUERY_OPTIONS
@@ -12,7 +13,7 @@ from scenicq.query.execution.pieces import Gathered
 from scenicq.query.execution.pieces import gather as find_pieces
 from scenicq.query.execution.question_notes import noted_question
 from scenicq.query.execution.recorded_columns import columns_of_records
-from scenicq.query.execution.records import FrameRecord, IntervalRecord, read_record
+from scenicq.query.execution.records import FrameRecord, IntervalRecord, Record, read_record
 from scenicq.query.execution.result_selection import ResultSelection
 from scenicq.query.execution.result_summary import ResultCount
 from scenicq.query.execution.result_tables import roles_of
@@ -81,6 +82,10 @@ def _selection(gathered: Gathered, where: str | None, sort: str | None) -> Resul
     return ResultSelection.read(where, sort, columns_of_records(gathered.records()))
 
 
+def _has_timeline(record: Record) -> bool:
+    return isinstance(record, IntervalRecord) and record.timeline is not UNSET
+
+
 def _write(gathered: Gathered, file: AnyPath | None, form: str, selection: ResultSelection | None) -> None:
     with destination(file) as sink, writing(file):
         first = next(gathered.records(), None)
@@ -88,7 +93,8 @@ def _write(gathered: Gathered, file: AnyPath | None, form: str, selection: Resul
         every = isinstance(first, FrameRecord) and first.all_matches is True
         writer = make_writer(form, sink, lambda: roles_of(gathered.records()),
                              recorded=lambda: columns_of_records(gathered.records()), origin=origin,
-                             over_time=over_time, every=every)  # fmt: skip
+                             over_time=over_time, every=every,
+                             timelines=lambda: any(map(_has_timeline, gathered.records())))  # fmt: skip
         records, summary = gathered.records(), gathered.summary
         if selection is not None:
             records = selection.ordered(selection.filtered(records))

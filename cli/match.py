@@ -154,6 +154,8 @@ def match(ctx: click.Context, scenario: str | None, dataset: str | None, *, prog
     reads = report or export or rank or sample or shard or engine or resume or options.all_matches or options.selects
     if chosen == "ids" and not reads:
         options = replace(options, proofs=False)
+    # for names alone nobody reads what roles do, unless the results are put together elsewhere
+    options = replace(options, timelines=bool(chosen != "ids" or report or shard or engine or resume))
     summarized = summary or (sys.stderr.isatty() and not quiet)
     if not (summarized or explain or report or near or shard or engine or resume):
         # of frames, advice reads it, too

@@ -13,6 +13,7 @@ from msgspec import UNSET
 from scenicq.query.execution.recorded_columns import show_cell
 from scenicq.query.execution.records import CauseRecord, CellRecord, IntervalRecord, Record, SeriesRecord
 from scenicq.query.execution.result_summary import ResultSummary
+from scenicq.query.execution.results import ModeRecord
 from scenicq.store.frame_names import ShortNames
 
 from .report import columns, moment, plain
@@ -29,6 +30,8 @@ _COLOURS = {"match": "green", "unknown": "yellow"}
 _DATE = len("2018-09-18 ")
 _SHORTEST_ID = 6
 _NARROWEST = 12
+_MODES_SHOWN = 6
+"""What a role does one after the other that a row names."""
 _FROM = " from "
 
 Row = tuple[str, ...]
@@ -225,7 +228,7 @@ def _cells(record: Record) -> Row:
             record.recording,
             moment(record.start_us),
             f"{(record.end_us - record.start_us) / 1e6:.1f}",
-            verdict,
+            verdict if record.timeline is UNSET else _with_modes(verdict, _modes(record.timeline)),
             " ".join(objects) or "-",
             f"{record.frames.count}{_FROM}{record.frames.first}",
         )
@@ -238,6 +241,26 @@ def _cells(record: Record) -> Row:
         " ".join(objects) or "-",
         sensors[0][1] if sensors else "-",
     )
+
+
+def _with_modes(verdict: str, modes: str) -> str:
+    """A verdict and what roles do."""
+    return f"{verdict}{',' if ':' in verdict else ':'} {modes}" if modes else verdict
+
+
+def _modes(modes: Sequence[ModeRecord]) -> str:
+    """What roles do, in short: `lead: FollowLaneBehavior(8) 3.2 s, take SetBrakeAction(1) 0.8 s`."""
+    told: dict[str, list[str]] = {}
+    for each in modes:
+        if each.kind != "behavior":
+            continue
+        what = each.mode[-1].what if each.mode else "?"
+        told.setdefault(each.of, []).append(f"{what} {(each.end_us - each.start_us) / 1e6:.1f} s")
+    parts = [
+        f"{of}: {', '.join([*several[:_MODES_SHOWN], *(['...'] if len(several) > _MODES_SHOWN else [])])}"
+        for of, several in told.items()
+    ]
+    return "; ".join(parts)
 
 
 def _recorded(record: Record) -> str:

@@ -56,6 +56,7 @@ from scenicq.compiler.values import Choice, Instance, ModelValue, describe, fail
 from scenicq.errors import Span
 from scenicq.forest.nodes import PAST, Feature, Identity, Index, Node
 from scenicq.forest.temporal import (
+    Activity,
     Always,
     And,
     Atom,
@@ -605,7 +606,21 @@ class CompositionGraph(ProcessGraph):
                     found = self.test(state, node, guards, Terminate(span) if simulation else over, found, span)
                 return found
 
-    def waits(self, rest: ProcessState, activity: Span | None, contracts: Sequence[object] = ()) -> Following:
+    def activities(self, frames: tuple[ProcessFrame, ...], what: Span) -> tuple[Activity, ...]:
+        """What goes on from one sample to the next: what is done, and each scenario that runs."""
+        found = [Activity(what)]
+        stack = [(frames, ())]
+        while stack:
+            inner, calls = stack.pop()
+            for frame in inner:
+                if isinstance(frame, TogetherFrame):
+                    for each in frame.scenarios:
+                        call = self.scenarios[each.number].call.span
+                        found.append(Activity(call, calls, each.number))
+                        stack.append((each.frames or (), (*calls, call)))
+        return tuple(found)
+
+    def waits(self, rest: ProcessState, activity: Span, contracts: Sequence[object] = ()) -> Following:
         """Go on at the next sample, once all scenarios that run side by side have come to it."""
         at = _inside(rest.frames)
         if at < 0:

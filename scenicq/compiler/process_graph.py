@@ -61,6 +61,7 @@ from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.forest.nodes import CompareOp, Constant, Feature, Identity, Index, Leaf, Node
 from scenicq.forest.temporal import (
+    Activity,
     Arm,
     Atom,
     Choose,
@@ -208,7 +209,7 @@ class ProcessGraph:
                 then, timers = found.then, timers_of(found.then)
                 if self.resumable and then.modes:
                     self.afresh[self.number(then)] = self.number(replace(then, modes=(), seen=-1))
-                return Wait(self.number(then), tuple(sorted(timers)), found.activity)
+                return Wait(self.number(then), tuple(sorted(timers)), found.activities)
             case Directs():
                 return replace(found.step, then=self.placed(found.then))
             case OnRunning():
@@ -431,7 +432,11 @@ class ProcessGraph:
         body = frame.body if block == len(frame.handlers) else frame.handlers[block]
         return replace(state, frames=(*state.frames[:at], switched, BlockFrame(body)), resumed=-1, asked=-1)
 
-    def waits(self, rest: ProcessState, activity: Span | None, contracts: Sequence[Contract] = ()) -> Following:
+    def activities(self, frames: tuple[ProcessFrame, ...], what: Span) -> tuple[Activity, ...]:
+        """What goes on from one sample to the next, given the frames in which something is done."""
+        return (Activity(what, tuple(frame.call.span for frame in frames if isinstance(frame, CallFrame))),)
+
+    def waits(self, rest: ProcessState, activity: Span, contracts: Sequence[Contract] = ()) -> Following:
         """Go on with a state at the next sample, by when some contracts must be kept."""
         frames = self.aged(rest.frames, "", first=rest.first)
         found: list[tuple[Held, int]] = []
@@ -450,7 +455,7 @@ class ProcessGraph:
         modes = tuple(found)
         after: Following = Waits(
             replace(rest, frames=frames, resumed=0, asked=-1, first=False, modes=modes, seen=0 if modes else -1),
-            activity,
+            self.activities(rest.frames, activity),
         )
         for timer, after_s in started:
             after = TimerStarts(timer, after_s, after)
@@ -552,7 +557,7 @@ class ProcessGraph:
             case PickBehavior():
                 return self.pick(state, node, rest)
             case Idle():
-                return self.waits(state, None)
+                return self.waits(state, node.span)
             case ast.Pass() | ast.ExpressionStatement(value=ast.LiteralValue()):
                 return rest
             case ast.DynamicStatement(kind="precondition" | "invariant"):
@@ -564,7 +569,7 @@ class ProcessGraph:
             case ast.DynamicStatement(kind="wait for" | "wait until"):
                 until = node.operand if node.kind == "wait until" else None
                 duration = node.operand if node.kind == "wait for" else None
-                return self.limited(state, rest, (Idle(),), until, duration, node.unit)
+                return self.limited(state, rest, (Idle(node.span),), until, duration, node.unit)
             case ast.Do() if self.agent is not None:
                 return self.do(state, node, rest)
             case ast.DynamicStatement(kind="terminate", operand=None) if self.scenario >= 0 and self.agent is not None:

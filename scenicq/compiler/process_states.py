@@ -11,7 +11,18 @@ from scenicq.compiler.local_values import Held
 from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.forest.nodes import Node
-from scenicq.forest.temporal import Begin, CheckSample, End, GiveUp, Leave, PutBehavior, Reject, Stop, Terminate
+from scenicq.forest.temporal import (
+    Activity,
+    Begin,
+    CheckSample,
+    End,
+    GiveUp,
+    Leave,
+    PutBehavior,
+    Reject,
+    Stop,
+    Terminate,
+)
 from scenicq.limits import LIMITS
 from scenicq.syntax import ast
 
@@ -82,7 +93,13 @@ class PickBehavior:
 
 @dataclass(frozen=True, slots=True)
 class Idle:
-    """Does nothing for ever."""
+    """Does nothing for ever.
+
+    Attributes:
+        span: The statement.
+    """
+
+    span: Span
 
 
 @dataclass(frozen=True, slots=True)
@@ -307,7 +324,7 @@ class Waits:
     """The sample is over, and something goes on."""
 
     then: ProcessState
-    activity: Span | None = None
+    activities: tuple[Activity, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,6 +14,7 @@ from scenicq.errors import Span
 from scenicq.forest.nodes import Node
 
 __all__ = [
+    "Activity",
     "Always",
     "And",
     "Arm",
@@ -166,18 +167,38 @@ class Goto:
 
 
 @dataclass(frozen=True, slots=True)
+class Activity:
+    """What goes on from one sample to the next.
+
+    Attributes:
+        what: What is done, in the program: an action, a behavior of the libraries, a `wait`, a scenario that runs.
+        calls: The calls within which it is done, the outermost first.
+        scenario: The number of the scenario that runs; -1 for what is none.
+    """
+
+    what: Span
+    calls: tuple[Span, ...] = ()
+    scenario: int = -1
+
+
+@dataclass(frozen=True, slots=True)
 class Wait:
     """Goes on with a step at the next sample.
 
     Attributes:
         then: The step.
         timers: The timers that go on; others are forgotten.
-        activity: What goes on meanwhile, in the program: an action, a behavior of the libraries, a `wait`.
+        activities: What goes on meanwhile; of what composes scenarios also those that run.
     """
 
     then: int
     timers: tuple[int, ...] = ()
-    activity: Span | None = None
+    activities: tuple[Activity, ...] = ()
+
+    @property
+    def activity(self) -> Span | None:
+        """What goes on meanwhile, in the program; None where nothing does."""
+        return self.activities[0].what if self.activities else None
 
 
 @dataclass(frozen=True, slots=True)

@@ -31,7 +31,7 @@ from scenicq.query.execution.records import json_text, record
 from scenicq.query.execution.result_origin import name_origin
 from scenicq.query.execution.result_summary import ResultCount, ResultSummary
 from scenicq.query.execution.result_tables import result_schema, result_table, summary_metadata
-from scenicq.query.execution.results import Funnel, Result
+from scenicq.query.execution.results import Funnel, ModeRecord, Result
 from scenicq.query.execution.run import Query
 from scenicq.query.execution.skipped_frames import summarize
 from scenicq.query.explain.frame_explanation import explain, show_explanation
@@ -126,9 +126,15 @@ class FrameResult(_Origin):
     @property
     def record(self) -> Mapping[str, Any]:
         """The values that a line of `scenicq match --format jsonl` has."""
-        return json.loads(
-            json_text(record(self.result, self.matches.origin, every=self.matches.query.options.all_matches))
-        )
+        query = self.matches.query
+        (told,) = query.with_timelines([self.result])
+        return json.loads(json_text(record(told, self.matches.origin, every=query.options.all_matches)))
+
+    @property
+    def timeline(self) -> tuple[ModeRecord, ...]:
+        """What roles, monitors and scenarios of an interval that matches do from when to when, found when asked."""
+        (told,) = self.matches.query.with_timelines([self.result])
+        return told.timeline or ()
 
     def explain(self) -> DisplayedText:
         """Say why the frame or interval matches, or what prevents it."""
@@ -283,10 +289,11 @@ class Matches(Sequence[FrameResult]):
         every = self.query.options.all_matches
         schema = result_schema(
             self.query.roles(), origin=self.origin, over_time=self.query.is_over_time(), every=every,
-            recorded=self.query.recorded_columns(),
+            recorded=self.query.recorded_columns(), timelines=self.query.has_timelines(),
         )  # fmt: skip
         schema = schema.with_metadata({**(schema.metadata or {}), **summary_metadata(self.summary)})
-        return result_table((record(each.result, every=every) for each in self._all()), schema)
+        results = self.query.with_timelines([each.result for each in self._all()])
+        return result_table((record(each, every=every) for each in results), schema)
 
     def to_pandas(self) -> Any:
         """The results as a data frame, what is recorded in columns as CSV has them; pandas is to be installed."""

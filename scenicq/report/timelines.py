@@ -1,4 +1,4 @@
-"""Intervals in a report: their frames as a run, and under the slider a timeline of what held when."""
+"""Intervals in a report: their frames as a run, and under the slider a timeline of who did what and what held when."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from scenicq.query.execution.interval_frames import frames_of, verdict_at
 from scenicq.query.execution.recorded_columns import show_cell
-from scenicq.query.execution.results import Recorded, RecordedCell, Result
+from scenicq.query.execution.results import ModeRecord, Recorded, RecordedCell, Result
 from scenicq.query.execution.run import Query
 from scenicq.query.explain.bands import Band, bands_of, conditions_over
 from scenicq.query.explain.interval_explanation import placed
@@ -21,6 +21,10 @@ if TYPE_CHECKING:
 
 __all__ = ["interval_runs"]
 
+_Lane = tuple[str, Sequence[tuple[str, str]], str]
+"""Whose lane it is, what is done with the class of its colour, and the lane."""
+_COLOURS = 8
+"""Colours that tell modes apart; more begin anew."""
 _WORDS = ("false", "unknown", "true")
 
 
@@ -32,7 +36,7 @@ def interval_runs(query: Query, results: Iterable[Result], numbers: dict[str, tu
         results: Intervals.
         numbers: As `scenicq.report.runs.frame_numbers` gives them.
     """
-    for result in results:
+    for result in query.with_timelines([*results]):
         frames = tuple(
             Result(
                 label.frame, label.recording, label.timestamp_us, verdict_at(label, result), label.sensors,
@@ -52,11 +56,41 @@ def _at_sample(recorded: Mapping[str, Recorded], place: int) -> Mapping[str, Rec
 
 
 def _timeline(query: Query, result: Result) -> str:
-    """The bands of an interval as a picture, and curves of what the program records."""
+    """What roles do in an interval, and its bands, as a picture; and curves of what the program records."""
     curves = [_curve(name, each.values) for name, each in (result.recorded or {}).items() if each.series]
     scenario, tracks, interval = placed(query, result)
     bands = () if scenario.dynamics is None else bands_of(scenario, conditions_over(scenario, tracks, interval))
-    return _drawn(bands, [*filter(None, curves)])
+    times_us = tracks.times_us[interval.start : interval.end + 1].tolist()
+    return _drawn(bands, [*_lanes(result.timeline or (), times_us)], [*filter(None, curves)])
+
+
+def _lanes(modes: Sequence[ModeRecord], times_us: Sequence[int]) -> Iterator[_Lane]:
+    """A lane for each role, monitor and scenario, coloured by what is done, with what that is and when."""
+    lanes: dict[tuple[str, str], list[ModeRecord]] = {}
+    for each in modes:
+        lanes.setdefault((each.kind, each.of), []).append(each)
+    at = {time: place for place, time in enumerate(times_us)}
+    for (kind, of), mine in lanes.items():
+        # of a scenario one colour will do
+        places = [each.mode[-1].place if each.mode else "" for each in mine]
+        colours = {place: number % _COLOURS for number, place in enumerate(dict.fromkeys(places))}
+        strips: list[str] = []
+        told: dict[str, list[str]] = {}
+        for each, place in zip(mine, places, strict=True):
+            span = f"{(each.start_us - times_us[0]) / 1e6:.1f}-{(each.end_us - times_us[0]) / 1e6:.1f} s"
+            what = each.mode[-1].what if each.mode else "not known"
+            told.setdefault(place, [what]).append(span)
+            where = " in ".join(f"{one.what} ({one.place})" for one in reversed(each.mode))
+            strips.append(
+                element("rect", element("title", escape(f"{where or what}: {span}")), x=at[each.start_us], y=0,
+                        width=each.frames, height=10, class_=f"chip c{colours[place]}" if each.mode else "unknown")
+            )  # fmt: skip
+        strips.append(element("line", class_="now", x1=0.5, x2=0.5, y1=0, y2=10))
+        texts = {place: f"{what} {', '.join(spans)}" for place, (what, *spans) in told.items()}
+        strip = element("svg", *strips, class_="strip lane", role="img", viewBox=f"0 0 {len(times_us)} 10",
+                        preserveAspectRatio="none", aria_label=f"{of}: {'; '.join(texts.values())}")  # fmt: skip
+        keys = [(text, f"chip c{colours[place]}" if place else "") for place, text in texts.items()]
+        yield of if kind == "behavior" else f"{kind} {of}", keys, strip
 
 
 def _curve(name: str, values: Sequence[RecordedCell]) -> tuple[str, str] | None:
@@ -85,7 +119,7 @@ def _curve(name: str, values: Sequence[RecordedCell]) -> tuple[str, str] | None:
     return told, strip
 
 
-def _drawn(bands: tuple[Band, ...], curves: Sequence[tuple[str, str]]) -> str:
+def _drawn(bands: tuple[Band, ...], lanes: Sequence[_Lane], curves: Sequence[tuple[str, str]]) -> str:
     rows: list[tuple[str, bool, str]] = []
     for band in bands:
         count = len(band.values)
@@ -99,7 +133,7 @@ def _drawn(bands: tuple[Band, ...], curves: Sequence[tuple[str, str]]) -> str:
         strip = element("svg", *strips, class_="strip", role="img", viewBox=f"0 0 {count} 10",
                         preserveAspectRatio="none", aria_label=_summary(band.values))  # fmt: skip
         rows.append((band.what, band.is_requirement, strip))
-    return markup("sheet", "timeline", bands=rows, curves=curves) if rows or curves else ""
+    return markup("sheet", "timeline", lanes=lanes, bands=rows, curves=curves) if lanes or rows or curves else ""
 
 
 def _pieces(values: tuple[int, ...]) -> Iterator[tuple[int, int, int]]:

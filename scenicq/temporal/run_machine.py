@@ -16,6 +16,7 @@ from typing import assert_never
 from scenicq.budget import Exhausted
 from scenicq.errors import Span
 from scenicq.forest.temporal import (
+    Activity,
     Arm,
     Atom,
     Begin,
@@ -43,7 +44,7 @@ from scenicq.temporal.literals import Literal, literals_of
 from scenicq.temporal.progression import HOLDS, LOST, Progression, Rest, accepts
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN
 
-__all__ = ["Advance", "RunMachine", "Situation"]
+__all__ = ["Advance", "Choices", "RunMachine", "Situation"]
 
 
 _Place = tuple[int, tuple[tuple[int, int], ...]]
@@ -60,7 +61,7 @@ _LISTED, _LEFT, _ENDED = 1, 2, 3
 """How a scenario runs: as those that its parent runs, after the parent has left it for others, or no more."""
 _Later = Callable[[float], int]
 """The first place of a sample that is so many seconds later, and at least the next one."""
-_Choices = Mapping[tuple[int, int], int]
+Choices = Mapping[tuple[int, int], int]
 """Which option each step of a process takes that is a choice."""
 
 
@@ -109,7 +110,7 @@ class _Sample:
     """
 
     holds: Callable[[int], bool]
-    chosen: _Choices
+    chosen: Choices
     here: int
     later: _Later | None
     rests: list[Rest]
@@ -117,7 +118,7 @@ class _Sample:
     running: list[int]
     behaving: dict[int, int]
     saved: dict[tuple[int, int], int]
-    met: list[Span | None] | None = None
+    met: list[tuple[Activity, ...]] | None = None
 
     def mode(self) -> _Mode:
         """The mode that it has come to."""
@@ -264,24 +265,30 @@ class RunMachine:
         reads = self.situations[situation].reads
         key = situation, tuple([values[atom] for atom in reads]), due, here
         if key not in self._known:
-            modes = self.situations[situation].modes
-            found: list[Advance] = []
-            stack: list[dict[tuple[int, int], int]] = [{}]
-            while stack:
-                chosen = stack.pop()
-                try:
-                    found.append(self._advanced(modes, reads, key[1], chosen, due=due, here=here, later=later))
-                except _ToChoose as choice:
-                    stack += [{**chosen, choice.step: option} for option in range(choice.count)]
-            self._known[key] = tuple(dict.fromkeys(found))
+            found = self.ways(situation, values, due=due, here=here, later=later)
+            self._known[key] = tuple(dict.fromkeys(advance for advance, _ in found))
         return self._known[key]
+
+    def ways(
+        self, situation: int, values: Mapping[int, int], *, due: bool, here: int = 0, later: _Later | None = None
+    ) -> Iterator[tuple[Advance, Choices]]:
+        """What a sample makes of a situation, with what the run chooses there; arguments are those of `advance`."""
+        modes, reads = self.situations[situation].modes, self.situations[situation].reads
+        told = tuple([values[atom] for atom in reads])
+        stack: list[Choices] = [{}]
+        while stack:
+            chosen = stack.pop()
+            try:
+                yield self._advanced(modes, reads, told, chosen, due=due, here=here, later=later), chosen
+            except _ToChoose as choice:
+                stack += [{**chosen, choice.step: option} for option in range(choice.count)]
 
     def _advanced(
         self,
         modes: _Modes,
         reads: tuple[int, ...],
         told: tuple[int, ...],
-        chosen: _Choices,
+        chosen: Choices,
         *,
         due: bool,
         here: int,
@@ -307,7 +314,7 @@ class RunMachine:
         )
 
     def _ways_of(
-        self, mode: _Mode, told: tuple[int, ...], values: Mapping[int, int], chosen: _Choices, *, due: bool, here: int,
+        self, mode: _Mode, told: tuple[int, ...], values: Mapping[int, int], chosen: Choices, *, due: bool, here: int,
         later: _Later | None,
     ) -> tuple[tuple[_Mode, bool], ...]:  # fmt: skip
         """The modes that a sample may lead to from one, each with whether the run is over."""
@@ -346,11 +353,11 @@ class RunMachine:
         return holds
 
     def _step(
-        self, mode: _Mode, holds: Callable[[int], bool], chosen: _Choices, *, due: bool, here: int,
-        later: _Later | None,
+        self, mode: _Mode, holds: Callable[[int], bool], chosen: Choices, *, due: bool, here: int,
+        later: _Later | None, met: list[tuple[Activity, ...]] | None = None,
     ) -> tuple[_Mode, bool]:  # fmt: skip
         """The mode after a sample at which everything is known, and whether the run is over."""
-        now = self._entered(mode, holds, chosen, here, later)
+        now = self._entered(mode, holds, chosen, here, later, met)
         if _REJECTS in mode.places:
             now.places = [_REJECTED if place == _REJECTS else place for place in mode.places]
             return now.mode(), due or any(map(holds, self._before))
@@ -377,8 +384,8 @@ class RunMachine:
         return now.mode(), over
 
     def _entered(
-        self, mode: _Mode, holds: Callable[[int], bool], chosen: _Choices, here: int, later: _Later | None,
-        met: list[Span | None] | None = None,
+        self, mode: _Mode, holds: Callable[[int], bool], chosen: Choices, here: int, later: _Later | None,
+        met: list[tuple[Activity, ...]] | None = None,
     ) -> _Sample:  # fmt: skip
         """A mode at a sample, which the program's own requirements have read."""
         top = len(self.dynamics.requirements)
@@ -400,27 +407,49 @@ class RunMachine:
         assert owner is not None
         return now.behaving.get(owner, number if number not in self._overriding else -1) == number
 
-    def activities(
-        self, situation: int, values: Mapping[int, int], *, here: int = 0, later: _Later | None = None
-    ) -> tuple[Span | None, ...] | None:
-        """What each process does from a sample on, in the program; None where that is not known, or to be chosen.
+    def doing(
+        self, situation: int, values: Mapping[int, int], chosen: Choices, *, due: bool, here: int = 0,
+        later: _Later | None = None, last: bool = False,
+    ) -> tuple[tuple[Activity, ...] | None, ...]:  # fmt: skip
+        """What each process does from a sample on, if the run goes on; None where that is not known.
 
-        Arguments are those of `advance`.
+        Arguments are those of `advance`, what is chosen, and whether it is the last sample.
         """
-        modes = self.situations[situation].modes
-        if len(modes) != 1:
-            return None
-        met: list[Span | None] = [None] * len(self.dynamics.processes)
-        try:
-            now = self._entered(next(iter(modes)), self._holding(values, {}), {}, here, later, met)
-            for number in (*self._composing, *self._awake(now, self._monitors)):
-                self._run(number, now)
-            for number in self._behaviors:
-                if self._behaves(number, now):
-                    self._run(number, now)
-        except (_NotObserved, _ToChoose):
-            return None
-        return tuple(met)
+        count = len(self.dynamics.processes)
+        hopeful: set[tuple[tuple[Activity, ...], ...]] = set()
+        lost: set[tuple[tuple[Activity, ...], ...]] = set()
+        for mode in self.situations[situation].modes:
+            stack: list[dict[int, bool]] = [{}]
+            tried = 0
+            while stack:
+                assumed = stack.pop()
+                tried += 1
+                if tried > LIMITS.observation_ways:
+                    return (None,) * count
+                met: list[tuple[Activity, ...]] = [()] * count
+                try:
+                    after, over = self._step(
+                        mode, self._holding(values, assumed), chosen, due=due, here=here, later=later, met=met
+                    )
+                except _NotObserved as error:
+                    stack += [{**assumed, error.atom: True}, {**assumed, error.atom: False}]
+                except Exhausted:
+                    return (None,) * count
+                else:
+                    if not over:
+                        runs = [
+                            tuple(
+                                [each for each in told if after.running[each.scenario : each.scenario + 1] != (_ENDED,)]
+                            )
+                            for told in met
+                        ]
+                        may_match = self._matches(after) if last else not after.is_lost
+                        (hopeful if may_match else lost).add(tuple(runs))
+        ways = [*(hopeful or lost)]
+        return tuple(
+            ways[0][number] if ways and all(each[number] == ways[0][number] for each in ways) else None
+            for number in range(count)
+        )
 
     def _run(self, number: int, now: _Sample) -> bool:
         """Lead a process through a sample; whether it ends the run."""
@@ -451,7 +480,7 @@ class RunMachine:
                     at = step.then
                 case Wait():
                     if now.met is not None:
-                        now.met[number] = step.activity
+                        now.met[number] = step.activities
                     # of a timer whose time is over nothing but that is known any more
                     running = [(timer, timers[timer]) for timer in step.timers if timer in timers]
                     now.places[number] = step.then, tuple([(key, at if at > now.here else 0) for key, at in running])

@@ -32,7 +32,7 @@ BAD_NUMBERS = [
 NEEDED = {"predictions": "missing.json"}
 FITTING = {
     "shard": "1/2", "engine": "dask", "export": "paths out", "enforce": "none", "waive": "collision", "sensors": ".",
-    "maps": "a.geojson", "params": "weather rain",
+    "maps": "a.geojson", "params": "weather rain", "drawing": "modes.svg",
     "tolerance": "0.3", "margin": "0.1", "distance_m": "1", "program": "ego = new Car", "format_": "nuscenes",
 }  # fmt: skip
 """Values of options whose kind is not told by their type."""

@@ -18,7 +18,7 @@ from scenicq.query.execution.recorded_columns import RecordedColumn, columns_of_
 from scenicq.query.execution.records import FrameRecord, SeriesRecord, decode_record, json_text, read_record, record
 from scenicq.query.execution.result_files import read_records
 from scenicq.query.execution.result_tables import result_schema, roles_of
-from scenicq.query.execution.results import IntervalSpan, LogDensity, Recorded, Result
+from scenicq.query.execution.results import IntervalSpan, LogDensity, ModeRecord, ProgramPlace, Recorded, Result
 from scenicq_cli.formats import make_writer
 
 texts = st.text(st.characters(codec="utf-8"), max_size=8)
@@ -50,9 +50,15 @@ def recordings_of(kind: st.SearchStrategy[object]) -> st.SearchStrategy[Recorded
 # a program's names have neither
 plain_names = names.filter(lambda each: not CONTROL.search(each) and "\n" not in each)
 recorded = st.dictionaries(plain_names, cells.flatmap(recordings_of), min_size=1, max_size=3)
+modes = st.builds(
+    ModeRecord, st.sampled_from(["behavior", "monitor", "scenario"]), texts,
+    st.lists(st.builds(ProgramPlace, texts, texts), max_size=2), whole, whole, st.integers(1, 2**40),
+)  # fmt: skip
+timelines = st.lists(modes, max_size=3).map(tuple)
 results = st.builds(
-    Result, names, names, whole, verdicts, named, st.none() | spans, st.none() | densities, st.none() | recorded
-)
+    Result, names, names, whole, verdicts, named, st.none() | spans, st.none() | densities, st.none() | recorded,
+    timeline=st.none() | timelines,
+)  # fmt: skip
 
 
 @given(results, texts)
@@ -83,8 +89,9 @@ def test_every_format_is_read_back(tmp_path_factory, form, every, result):
     roles = lambda: roles_of([told])  # noqa: E731
     columns = lambda: columns_of_records([told])  # noqa: E731
     writer = make_writer(
-        form, sink, roles, recorded=columns, origin="town@1", ranked=ranked, over_time=over_time, every=every
-    )
+        form, sink, roles, recorded=columns, origin="town@1", ranked=ranked, over_time=over_time, every=every,
+        timelines=lambda: result.timeline is not None,
+    )  # fmt: skip
     writer.write(told)
     writer.finish()
     file = tmp_path_factory.mktemp("r") / f"r.{'csv' if form == 'spreadsheet' else form}"
@@ -111,6 +118,11 @@ def test_the_columns_are_the_fields():
     times = result_schema(("ego",), over_time=True)
     assert str(times.field("frames").type) == "struct<first: string, last: string, count: int64>"
     assert [str(times.field(name).type) for name in ("end_us", "open_ended")] == ["int64", "bool"]
+    assert "timeline" not in times.names
+    told = result_schema(("ego",), over_time=True, timelines=True).field("timeline").type
+    place = "list<item: struct<what: string, place: string>>"
+    parts = f"kind: string, of: string, mode: {place}, start_us: int64, end_us: int64, frames: int64"
+    assert str(told) == f"list<item: struct<{parts}>>"
 
 
 LINE = '{"frame": "a", "recording": "r", "verdict": "match"%s}'

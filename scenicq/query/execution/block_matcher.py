@@ -38,13 +38,14 @@ if TYPE_CHECKING:  # they take long to load, and not every query needs the last 
     from scenicq.query.execution.own_lanes import OwnLanes
     from scenicq.query.execution.recorder import Recorder
     from scenicq.query.execution.recording_matcher import DecidedRecordings, RecordingMatcher, Survivors
+    from scenicq.query.execution.timelines import Timelines
     from scenicq.query.execution.variant_matcher import VariantMatcher
 
 _FIRST_BATCH, _BATCH = 16, 2048
 """Labels whose places are looked up together: few until it is known what matters."""
 MAPS_KEPT = 8
 """Maps of which a process keeps what it needs to match: each is a few megabytes, and labels come map by map."""
-__all__ = ["MAPS_KEPT", "CompiledMap", "Decided", "Decider", "every_label"]
+__all__ = ["MAPS_KEPT", "CompiledMap", "Decided", "Decider", "every_label", "has_timelines"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,6 +128,7 @@ class Decider:
         every: Whether the names of excluded frames are wanted.
         proofs: Whether somebody reads the values that prove matches over time.
         reasons: Whether somebody reads what frames and bindings fail at in a query over time.
+        timelines: Whether somebody reads what roles do from when to when in a query over time.
         time: Options of a query over time.
         until: When the time is over; see `budget.deadline`.
     """
@@ -141,9 +143,11 @@ class Decider:
     every: bool
     proofs: bool = True
     reasons: bool = True
+    timelines: bool = False
     time: IntervalOptions = field(default_factory=IntervalOptions)
     until: float | None = None
     _recorders: Recent[str, Recorder] = field(default_factory=lambda: Recent(MAPS_KEPT))
+    _timelines: Recent[str, Timelines] = field(default_factory=lambda: Recent(MAPS_KEPT))
     _own_lanes: Recent[str, OwnLanes | None] = field(default_factory=lambda: Recent(MAPS_KEPT))
     _matchers: Recent[str, Matcher] = field(default_factory=lambda: Recent(MAPS_KEPT))
     _over_time: Recent[str, RecordingMatcher | VariantMatcher] = field(default_factory=lambda: Recent(MAPS_KEPT))
@@ -288,6 +292,8 @@ class Decider:
         found = self._recording_matcher(block.map).decide(block, left)
         if (own_lanes := self._lanes_of(block.map)) is not None:
             found.results = [*own_lanes.at_the_start(self.dataset, found.results)]
+        if self.timelines and (filler := self._timelines_of(block.map)) is not None:
+            found.results = filler.fill(found.results)
         return found
 
     def _recorder(self, map_name: str) -> Recorder | None:
@@ -314,6 +320,19 @@ class Decider:
             return OwnLanes(self.compile_map(map_name).scenario) if OwnLanes(planned.scenario).asked else None
 
         return self._own_lanes.get(map_name, make)
+
+    def _timelines_of(self, map_name: str) -> Timelines | None:
+        """What works out what roles do from when to when; None where the program does not say."""
+        if not has_timelines(self.plan_map(map_name).scenario):
+            return None
+        # takes long to load
+        from scenicq.query.execution.timelines import Timelines  # noqa: PLC0415
+
+        def make() -> Timelines:
+            compiled = self.compile_map(map_name)
+            return Timelines(self.dataset, compiled.scenario, map_name, self.options)
+
+        return self._timelines.get(map_name, make)
 
     def _players(
         self, plan: Plan, block: Block, frames: NDArray[np.int64]
@@ -372,6 +391,11 @@ class Decider:
                     for (label, _), verdict in zip(batch, matcher.match_all(batch, details=self.every), strict=True):
                         yield [_result(label, verdict, own_lanes)]
                 size = _BATCH
+
+
+def has_timelines(scenario: Scenario) -> bool:
+    """Whether a program has a behavior, a monitor or a scenario that runs others."""
+    return any(each.dynamics is not None and each.dynamics.processes for each in (scenario, *scenario.variants))
 
 
 def _with_records(recorder: Recorder, found: Iterator[list[Result]]) -> Iterator[list[Result]]:

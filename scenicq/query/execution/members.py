@@ -67,7 +67,13 @@ class Members:
         if name == "ego":
             return self.block.present_ego(np.arange(first, end))
         named, ids = self._named, self._ids
-        at_first = self._find(first, lambda member: (ids[member] if named[member] is None else named[member]) == name)
+
+        def is_it(member: int) -> bool:
+            return (ids[member] if named[member] is None else named[member]) == name
+
+        # who comes later is looked for where he comes
+        found_at = (self._find(label, is_it) for label in range(first, end))
+        at_first = next((member for member in found_at if member >= 0), -1)
         found = np.full(end - first, -1)
         if at_first < 0:
             return found

@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import json
+import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -89,11 +90,14 @@ def fingerprint(dataset: Dataset, program: str, options: QueryOptions) -> str:
     if options.selects:
         # of the matches that are shown, which is seen to afterwards
         asked["limit"] = None
-    for name in ("jobs", "prefilter", "strict", "until", "where", "sort"):
+    for name in ("jobs", "prefilter", "strict", "until", "where", "sort", "timelines"):
         asked.pop(name)
     if "record" in program:
         # versions before have left out what is recorded
         asked["recorded"] = True
+    if options.timelines and re.search(r"\b(behavior|monitor|scenario)\b", program):
+        # and what roles do from when to when
+        asked["timelines"] = True
     text = json.dumps([tables, program, asked], sort_keys=True, default=str)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 

@@ -15,7 +15,15 @@ from msgspec import UNSET, Struct, UnsetType
 from scenicq.errors import Source, Span
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown, Verdict, WitnessValue
 from scenicq.query.execution.result_summary import ResultSummary
-from scenicq.query.execution.results import IntervalSpan, LogDensity, Recorded, RecordedCell, Result, Standing
+from scenicq.query.execution.results import (
+    IntervalSpan,
+    LogDensity,
+    ModeRecord,
+    Recorded,
+    RecordedCell,
+    Result,
+    Standing,
+)
 
 __all__ = [
     "DENSITY",
@@ -154,6 +162,8 @@ class IntervalRecord(Struct, frozen=True, kw_only=True):
         lanes: As of a frame, at the first.
         witness, cause: As of a frame.
         open_ended: Whether the program does not say when the interval ends.
+        timeline: What roles, monitors and scenarios of a match do from when to when; absent where the program has no
+            behavior, monitor or scenario that runs others.
         recorded: As of a frame; over all samples of the interval, unless `initial` or `final` is recorded.
         unrecorded: As of a frame, samples counted.
         log_density, log_density_error, log_weight, no_density, dataset, summary: As of a frame.
@@ -169,6 +179,7 @@ class IntervalRecord(Struct, frozen=True, kw_only=True):
     lanes: dict[str, StandingRecord] | UnsetType = UNSET
     cause: CauseRecord | UnsetType = UNSET
     open_ended: bool = False
+    timeline: list[ModeRecord] | UnsetType = UNSET
     recorded: dict[str, CellRecord | SeriesRecord] | UnsetType = UNSET
     unrecorded: dict[str, dict[str, int]] | UnsetType = UNSET
     log_density: float | UnsetType | None = UNSET
@@ -254,6 +265,8 @@ def record(result: Result, dataset: str = "", *, every: bool = False) -> Record:
         more |= _recorded(result.recorded, series=span is not None)
     if result.lanes is not None:
         more["lanes"] = {role: StandingRecord(list(each.own), list(each.others)) for role, each in result.lanes.items()}
+    if result.timeline is not None:
+        more["timeline"] = list(result.timeline)
     if span is None:
         return FrameRecord(frame=result.frame, recording=result.recording, timestamp_us=result.timestamp_us,
                            verdict=name, correspondence=_dict(roles), witness=witness, cause=cause,
@@ -332,8 +345,9 @@ def read_record(record: Record, source: Source) -> Result:
         )  # fmt: skip
     frames = record.frames
     span = IntervalSpan(frames.last, record.end_us, frames.count, record.open_ended)
+    timeline = None if record.timeline is UNSET else tuple(record.timeline)
     return Result(frames.first, record.recording, record.start_us, verdict, interval=span, recorded=recorded,
-                  lanes=standing)  # fmt: skip
+                  lanes=standing, timeline=timeline)  # fmt: skip
 
 
 def _verdict(record: Record, source: Source) -> Verdict:

@@ -33,7 +33,7 @@ _T = TypeVar("_T")
 _NEEDED = ("frame", "recording", "verdict", "timestamp_us", "correspondence", "cause",
            "start_us", "end_us", "frames")  # fmt: skip
 """What tells what became of a result."""
-_NESTED = ("correspondence", "cause", "sensors", "witness", "lanes", "frames", "unrecorded", "summary")
+_NESTED = ("correspondence", "cause", "sensors", "witness", "lanes", "frames", "timeline", "unrecorded", "summary")
 _LONGEST = 10_000_000
 """Characters of a cell of CSV."""
 

@@ -7,6 +7,7 @@ sensors          map      channel -> path
 recorded         struct   what the program records, one field a value; see `recorded_columns`
 unrecorded       map      name of a recorded value -> why it is null -> how often
 frames           struct   of an interval: first, last, count
+timeline         list     what roles do from when to when: kind, of, mode (what, place), start_us, end_us, frames
 
 The dataset and the summary stand in the metadata.
 """
@@ -58,7 +59,7 @@ def roles_of(records: Iterable[Record]) -> tuple[str, ...]:
 
 def result_schema(
     roles: Sequence[str], *, origin: str = "", ranked: bool = False, over_time: bool = False, every: bool = False,
-    recorded: Sequence[RecordedColumn] = (),
+    recorded: Sequence[RecordedColumn] = (), timelines: bool = False,
 ) -> pa.Schema:  # fmt: skip
     """The columns of results.
 
@@ -69,8 +70,10 @@ def result_schema(
         over_time: Whether the results are intervals.
         every: Whether each correspondence by which a frame matches is a result.
         recorded: What the program records.
+        timelines: Whether results say what roles do from when to when.
     """
-    left_out = {"dataset", "summary", *(() if ranked else DENSITY), *(() if every else ("all_matches",))}
+    left_out = {"dataset", "summary", *(() if ranked else DENSITY), *(() if every else ("all_matches",)),
+                *(() if timelines else ("timeline",))}  # fmt: skip
     left_out |= set(() if recorded else RECORDED)
     own = {"correspondence": pa.struct([(role, pa.string()) for role in roles]), "recorded": recorded_struct(recorded)}
     columns = [

@@ -8,6 +8,8 @@ from contextlib import closing
 from dataclasses import dataclass, field
 from typing import Any
 
+from msgspec import Struct
+
 from scenicq.errors import Diagnostic
 from scenicq.match.verdict import Match, NoMatch, Unknown, Verdict
 
@@ -16,6 +18,8 @@ __all__ = [
     "Funnel",
     "IntervalSpan",
     "LogDensity",
+    "ModeRecord",
+    "ProgramPlace",
     "Recorded",
     "RecordedCell",
     "Result",
@@ -94,6 +98,38 @@ class Standing:
     others: tuple[str, ...] = ()
 
 
+class ProgramPlace(Struct, frozen=True):
+    """Something that the program says.
+
+    Attributes:
+        what: What.
+        place: `file:line:column`.
+    """
+
+    what: str
+    place: str
+
+
+class ModeRecord(Struct, frozen=True):
+    """What a role, a monitor or a scenario does from when to when.
+
+    Attributes:
+        kind: `behavior`, `monitor` or `scenario`.
+        of: The role, the monitor as it is required, or the scenario that runs.
+        mode: The calls within which something is done, the outermost first, and what is done: an action, a behavior
+            of the libraries, a `wait`; of a scenario its own call last. Nothing where that is not known.
+        start_us, end_us: Timestamps of the sample at which it begins, and of that at which it is over, or the last one.
+        frames: At how many samples it goes on.
+    """
+
+    kind: str
+    of: str
+    mode: list[ProgramPlace]
+    start_us: int
+    end_us: int
+    frames: int
+
+
 @dataclass(frozen=True, slots=True)
 class Result:
     """The verdict on one frame, or on an interval of a recording.
@@ -107,6 +143,8 @@ class Result:
         recorded: What the program records of a match, by name; None where nobody asks for it.
         lanes: In which lanes the roles of a match stand whose lanes the program asks for, by name; of an interval at
             its first frame. None where it asks for none.
+        timeline: What roles, monitors and scenarios of a match do from when to when, role by role, in order of time.
+            None where nobody asks for it, or the program says nothing of the kind.
     """
 
     frame: str
@@ -118,11 +156,13 @@ class Result:
     density: LogDensity | None = None
     recorded: Mapping[str, Recorded] | None = None
     lanes: Mapping[str, Standing] | None = None
+    timeline: tuple[ModeRecord, ...] | None = None
 
     def __reduce__(self) -> tuple[type[Result], tuple[Any, ...]]:
         """Pickled as a call, which takes half the time; densities are computed where results arrive."""
         told = (self.frame, self.recording, self.timestamp_us, self.verdict, self.sensors, self.interval)
-        return Result, told if self.recorded is self.lanes is None else (*told, None, self.recorded, self.lanes)
+        more = self.recorded, self.lanes, self.timeline
+        return Result, told if more == (None, None, None) else (*told, None, *more)
 
 
 @dataclass(frozen=True, slots=True)

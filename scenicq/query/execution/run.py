@@ -9,6 +9,7 @@ from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Se
 from contextlib import ExitStack, closing, nullcontext
 from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -25,7 +26,7 @@ from scenicq.match.options import MatchOptions
 from scenicq.match.problem.preprocess import ready
 from scenicq.match.verdict import Cause, NoMatch
 from scenicq.query.execution.block_executor import BlockExecutor
-from scenicq.query.execution.block_matcher import MAPS_KEPT, CompiledMap, Decided, Decider
+from scenicq.query.execution.block_matcher import MAPS_KEPT, CompiledMap, Decided, Decider, has_timelines
 from scenicq.query.execution.compiled_map import (
     about_dataset,
     is_about_map,
@@ -51,6 +52,8 @@ from scenicq.temporal.interval_options import IntervalOptions
 
 if TYPE_CHECKING:
     import duckdb
+
+    from scenicq.query.execution.timelines import Timelines
 
 __all__ = ["MAP_LACKS", "Query", "QueryOptions", "RecordingRange"]
 
@@ -87,6 +90,7 @@ class QueryOptions:
             prefilter excludes.
         interval_reasons: Whether somebody reads what frames and bindings fail at in a query over time; if not, the
             funnel does not say it, and counts of starts and bindings only those that the prefilter leaves.
+        timelines: Whether somebody reads what roles do from when to when in a query over time.
         until: When the time is over, as of `time.monotonic`; None for never. What is decided by then are the results.
     """
 
@@ -113,6 +117,7 @@ class QueryOptions:
     proofs: bool = True
     reasons: bool = True
     interval_reasons: bool = True
+    timelines: bool = False
     until: float | None = None
 
     @property
@@ -150,6 +155,7 @@ class _Known:
         extents: Where the frames of each map are.
         coverage: What is compared.
         attributes: The types of what labels say, by the names of attributes.
+        timelines: What works out what roles do, by the map; None where the program does not say.
     """
 
     compiled: dict[str, CompiledMap] = field(default_factory=dict["str", CompiledMap])
@@ -162,6 +168,7 @@ class _Known:
     extents: dict[str, list[Extent]] | None = None
     coverage: Coverage | None = None
     attributes: Mapping[str, frozenset[type]] | None = None
+    timelines: dict[str, Timelines | None] = field(default_factory=dict["str", "Timelines | None"])
 
 
 @dataclass(eq=False)
@@ -448,6 +455,34 @@ class Query:
         scenarios = self._scenarios()
         return columns_of(scenarios, over_time=any(map(self.over_time, scenarios)))
 
+    def has_timelines(self) -> bool:
+        """Whether results may say what roles do from when to when: the program has a behavior or the like."""
+        self._lacking_maps()
+        return any(map(has_timelines, self._scenarios()))
+
+    def with_timelines(self, results: Sequence[Result]) -> list[Result]:
+        """The same results, in which intervals that match say what their roles do from when to when.
+
+        Args:
+            results: The results, those of one recording together.
+        """
+        if not any(each.timeline is None and each.interval is not None for each in results) or not self.has_timelines():
+            return list(results)
+        # takes long to load
+        from scenicq.query.execution.timelines import Timelines  # noqa: PLC0415
+
+        found: list[Result] = []
+        for _, several in groupby(results, lambda each: each.recording):
+            mine = list(several)
+            name = self.dataset.label(mine[0].frame).map
+            if name not in self._known.timelines:
+                scenario = self.compiled_map(name).scenario
+                made = Timelines(self.dataset, scenario, name, self.options.match) if has_timelines(scenario) else None
+                self._known.timelines[name] = made
+            filler = self._known.timelines[name]
+            found += mine if filler is None else filler.fill(mine)
+        return found
+
     def plans(self) -> list[Plan]:
         """The prefilter on each map."""
         there = filter(self.frames, self.fitting_maps())
@@ -506,6 +541,7 @@ class Query:
             every=options.every,
             proofs=options.proofs,
             reasons=options.interval_reasons or options.every,
+            timelines=options.timelines,
             time=options.time,
             until=options.until,
         )

@@ -14,14 +14,22 @@ from scenicq.forest.nodes import Compare, Node
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.temporal import Atom, Formula, Process, Test, operands
 from scenicq.store.tracks import RecordingTracks
-from scenicq.temporal.activities import activities_of
 from scenicq.temporal.atoms import AtomColumns, UnclearVariable
 from scenicq.temporal.formula_values import FormulaValues
 from scenicq.temporal.intervals import IntervalVerdict
 from scenicq.temporal.samples import Samples
 from scenicq.temporal.truth import Truth
 
-__all__ = ["Band", "KnownConditions", "bands_of", "columns_of", "conditions_over", "show_activities", "show_bands"]
+__all__ = [
+    "Band",
+    "KnownConditions",
+    "bands_of",
+    "columns_of",
+    "conditions_over",
+    "shortened",
+    "show_bands",
+    "sides_over",
+]
 
 _WIDTH = 60
 """Characters of a band, at most."""
@@ -91,7 +99,7 @@ def bands_of(scenario: Scenario, over: KnownConditions) -> tuple[Band, ...]:
         if number in known and number not in arrivals:
             values = tuple(known[number].tolist())
             told = what or _named(condition, number)
-            found.append(Band(told, condition.span, values, sides=_sides(columns, condition)))
+            found.append(Band(told, condition.span, values, sides=sides_over(columns, condition)))
 
     for requirement in dynamics.requirements:
         numbers = _atoms(requirement.formula)
@@ -110,23 +118,6 @@ def bands_of(scenario: Scenario, over: KnownConditions) -> tuple[Band, ...]:
         for number, what in _asked(process, dynamics.conditions, who).items():
             add(number, what)
     return tuple(found)
-
-
-def show_activities(
-    scenario: Scenario, tracks: RecordingTracks, interval: IntervalVerdict, over: KnownConditions
-) -> list[str]:
-    """What behaviors do over an interval, a line for each object."""
-    dynamics = scenario.dynamics
-    if dynamics is None or all(each.object is None for each in dynamics.processes):
-        return []
-    seconds = tracks.seconds[interval.start : interval.end + 1]
-    lines: dict[int, list[str]] = {}
-    for each in activities_of(dynamics, seconds - seconds[0], over.truths):
-        # it goes on to the sample at which something else does
-        until = seconds[min(each.end + 1, len(seconds) - 1)]
-        text = _short(" ".join(each.what.text.split()))
-        lines.setdefault(each.object, []).append(f"{text} {seconds[each.start]:.1f}-{until:.1f} s")
-    return [f"{scenario.every_object[index].name}: {', '.join(told)}" for index, told in lines.items()]
 
 
 def _asked(process: Process, conditions: Sequence[Node], who: str) -> dict[int, str]:
@@ -157,7 +148,7 @@ def _named(condition: Node, number: int) -> str:
     return f"condition {number + 1}" if condition.span is None else " ".join(condition.span.text.split())
 
 
-def _sides(columns: AtomColumns, condition: Node) -> tuple[tuple[float, float], ...]:
+def sides_over(columns: AtomColumns, condition: Node) -> tuple[tuple[float, float], ...]:
     """Both sides of a comparison of numbers at each sample."""
     if not isinstance(condition, Compare):
         return ()
@@ -169,11 +160,12 @@ def show_bands(bands: Sequence[Band]) -> list[str]:
     """Bands as text: `#` true, `.` false, `?` unknown; of many samples, each character stands for several."""
     if not bands:
         return []
-    width = max(len(_short(band.what)) for band in bands)
-    return [f"{_short(band.what).ljust(width)}  {_drawn(band.values)}" for band in bands]
+    width = max(len(shortened(band.what)) for band in bands)
+    return [f"{shortened(band.what).ljust(width)}  {_drawn(band.values)}" for band in bands]
 
 
-def _short(text: str) -> str:
+def shortened(text: str) -> str:
+    """A text as long as a name in a line may be."""
     return text if len(text) <= 48 else f"{text[:47]}\N{HORIZONTAL ELLIPSIS}"
 
 

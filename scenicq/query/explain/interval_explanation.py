@@ -18,10 +18,11 @@ from scenicq.query.execution.recording_matcher import CUT_OFF
 from scenicq.query.execution.recording_starts import DecidedStart, few_findings, start_table, starts_of
 from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query
-from scenicq.query.explain.bands import Band, bands_of, columns_of, conditions_over, show_activities, show_bands
+from scenicq.query.explain.bands import Band, bands_of, columns_of, conditions_over, show_bands
 from scenicq.query.explain.changes import longest_with, shift_comparison
 from scenicq.query.explain.frame_explanation import explain, show_explanation
 from scenicq.query.explain.interval_changes import Shift, least_changes
+from scenicq.query.explain.mode_explanation import run_modes
 from scenicq.query.explain.moments import frame_time, intervals_around
 from scenicq.smt.answer import Solver
 from scenicq.store.labels import Label
@@ -50,7 +51,9 @@ class IntervalExplanation:
         interval: The match, else what came furthest; None where no frame matches the initial scene.
         roles: The track of each object.
         bands: Over the interval.
-        activities: What behaviors do from when to when, a line for each object.
+        activities: What behaviors, monitors and scenarios do from when to when, a line for each.
+        asked: What the behavior that has rejected the run asked for, and what its object has shown.
+        broken_s: When a behavior or monitor has rejected the run; None where none has.
         changes: What one number of the program would have to be for the recording to match; each was tried.
         failed: What frames failed at that do not match the initial scene.
         example: One of the frames that failed at what the fewest did.
@@ -63,6 +66,8 @@ class IntervalExplanation:
     roles: tuple[tuple[str, str], ...] = ()
     bands: tuple[Band, ...] = ()
     activities: tuple[str, ...] = ()
+    asked: tuple[str, ...] = ()
+    broken_s: float | None = None
     changes: tuple[str, ...] = ()
     failed: Counter[str] | None = None
     example: str = ""
@@ -138,10 +143,12 @@ class IntervalExplanation:
             f"broken {self._when(interval)}",
             severity="excluded",
         )
-        hints = [f"  = {each}" for each in (*self._margins(interval), *self.changes)]
+        hints = [f"  = {each}" for each in (*self.asked, *self._margins(interval), *self.changes)]
         return [render(told), *hints, ""]
 
     def _when(self, interval: IntervalVerdict) -> str:
+        if self.broken_s is not None:
+            return f"at {self.broken_s:.1f} s"
         last = float(self.tracks.seconds[interval.end])
         mine = next((band for band in self.bands if band.is_requirement and band.span == interval.broken), None)
         wrong = [place for place, value in enumerate(mine.values) if value == FALSE] if mine is not None else []
@@ -255,8 +262,18 @@ def _explain_variant(
     over = conditions_over(scenario, tracks, best)
     bands = bands_of(scenario, over)
     least_s = None if dynamic else query.options.time.min_duration_s
-    activities = tuple(show_activities(scenario, tracks, best, over))
-    return IntervalExplanation(tracks, best, roles, bands, activities, changes, undecided=undecided, least_s=least_s)
+    modes = run_modes(scenario, tracks, best, over)
+    activities, asked, broken_s = (), (), None
+    if modes is not None:
+        assert scenario.dynamics is not None
+        spans = [each.span for each in scenario.dynamics.processes]
+        if best.broken in spans:
+            broken_s = modes.ends(spans.index(best.broken))
+            asked = tuple(modes.broken(spans.index(best.broken)))
+        activities = tuple(modes.lines())
+    return IntervalExplanation(
+        tracks, best, roles, bands, activities, asked, broken_s, changes, undecided=undecided, least_s=least_s
+    )
 
 
 def explain_beginning(query: Query, solver: Solver, label: Label) -> tuple[Verdict, str]:

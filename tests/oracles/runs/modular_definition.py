@@ -272,6 +272,8 @@ class _Running:
     required: list[tuple[str, int, list[bool]]] = field(default_factory=list)
     composing: Iterator[Any] | None = None
     overridden: dict[str, Any] = field(default_factory=dict)
+    name: str = ""
+    stepped: int = -1
 
 
 @dataclass
@@ -293,6 +295,7 @@ class Simulation:
     chosen: list[int]
     at: int = 0
     used: int = 0
+    running: dict[int, set[tuple[str, ...]]] = field(default_factory=dict)
 
     def ends(self) -> tuple[set[int], bool]:
         """Where it may end as a match if it ends anywhere, else the one where it ends; whether the program ends it."""
@@ -317,11 +320,19 @@ class Simulation:
                     running = self.doing[agent]
                     if running is not None and next(running, None) is not None:
                         return ({self.at} if self._accepted() else set()), True
+                self.running[self.at] = set(self._that_run(top, ()))
                 self.at += 1
                 if self.at == len(self.rows):
                     return found, False
         except Rejected:
             return found, False
+
+    def _that_run(self, each: _Running, calls: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
+        """The names of the scenarios that have been led through the sample and go on, each after those that run it."""
+        for sub in each.subs:
+            if sub.runs and sub.stepped == self.at:
+                yield (*calls, sub.name)
+                yield from self._that_run(sub, (*calls, sub.name))
 
     def _holds(self, number: int) -> bool:
         return self.rows[self.at][number]
@@ -343,7 +354,7 @@ class Simulation:
     def _begun(self, name: str) -> _Running:
         part = self.program.parts[name]
         self._guard(part.pre, part.invariant)
-        found = _Running(part, self.at)
+        found = _Running(part, self.at, name=name)
         self.living.append(found)
         for each in part.setup:
             match each:
@@ -372,6 +383,7 @@ class Simulation:
 
     def _step(self, each: _Running) -> str | None:
         """Lead a scenario through a sample; why it ends."""
+        each.stepped = self.at
         for kind, number, seen in each.required:
             seen.append(self._holds(number))
             if kind == "always" and not seen[-1]:
@@ -540,14 +552,23 @@ def all_ends(
 
     None where there are very many.
     """
-    found: list[tuple[set[int], bool]] = []
+    found = all_runs(program, rows, times, start)
+    return None if found is None else [each[:2] for each in found]
+
+
+def all_runs(
+    program: Modular, rows: list[list[bool]], times: list[float], start: int
+) -> list[tuple[set[int], bool, dict[int, set[tuple[str, ...]]]]] | None:
+    """The same, with the scenarios that run after each sample."""
+    found: list[tuple[set[int], bool, dict[int, set[tuple[str, ...]]]]] = []
     stack: list[list[int]] = [[]]
     while stack:
         chosen = stack.pop()
         if len(found) > 300:
             return None
+        simulation = Simulation(program, rows, times, start, chosen)
         try:
-            found.append(Simulation(program, rows, times, start, chosen).ends())
+            found.append((*simulation.ends(), simulation.running))
         except Open as choice:
             stack += [[*chosen, option] for option in range(choice.count)]
     return found

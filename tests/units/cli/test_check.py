@@ -1,6 +1,7 @@
 """`scenicq check`."""
 
 import json
+from xml.etree import ElementTree
 
 import pytest
 
@@ -83,3 +84,41 @@ def test_bad_input_gives_one_diagnostic(run, scenarios, crossroads, args, code):
     assert result.stderr.startswith(f"error[{code}]: ")
     (found,) = json.loads(run("check", *words, "--format", "json").stdout)
     assert (found["code"], found["line"]) == (code, None)
+
+
+DRIVES = """model scenic.domains.driving.model
+behavior Drives():
+    while self.speed < 5:
+        wait
+    take SetBrakeAction(1)
+    terminate
+ego = new Car with behavior Drives()
+"""
+
+
+def test_modes_are_drawn(run, tmp_path):
+    program, picture = tmp_path / "drives.scenic", tmp_path / "modes.svg"
+    program.write_text(DRIVES, encoding="utf-8")
+    told = run("check", program, "--modes", "--draw-modes", picture)
+    assert told.exit_code == 0, told.output
+    root = ElementTree.fromstring(picture.read_text(encoding="utf-8"))
+    space = "{http://www.w3.org/2000/svg}"
+    boxes = [each for each in root.iter(f"{space}rect") if each.get("class") == "box"]
+    texts = ["".join(each.itertext()) for each in root.iter(f"{space}text")]
+    # a box for each mode of the table, a row and a line for each way to a mode
+    rows = [line for line in told.stdout.splitlines() if " -> " in line]
+    assert len(boxes) == len(rows) == 3
+    assert [each for each in texts if "[line" in each and each[0].isdigit()] == [
+        "1  wait [line 4]", "2  take SetBrakeAction(1) [line 5]",
+    ]  # fmt: skip
+    ways = [way for row in rows for way in row.split(" -> ")[1].split("; ")]
+    assert [text.removeprefix("\N{RIGHTWARDS ARROW} ") for text in texts if text[0] == "\N{RIGHTWARDS ARROW}"] == ways
+    lines = [each for each in root.iter(f"{space}path") if each.get("class") == "way"]
+    assert len(lines) == sum(way[0].isdigit() for way in ways)
+
+
+def test_modes_are_drawn_as_svg_alone(run, tmp_path):
+    done = run("check", "-e", "ego = new Object", "--draw-modes", tmp_path / "modes.png")
+    assert done.exit_code == 2
+    assert "modes are drawn as SVG" in done.stderr
+    assert not list(tmp_path.iterdir())

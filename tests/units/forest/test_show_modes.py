@@ -41,11 +41,10 @@ def test_each_mode_has_a_line():
         "  0  begins -> 1 if (ego.speed > 3); 2 if not (ego.speed > 3)",
         "  1  wait [line 14] -> the run ends",
         "  2  do Sub() until ego.speed > 3 [line 13] -> 1 in 2 ways; 2 if not (ego.speed > 3)",
-        "behavior of ego [line 11]: 3 modes",
+        "behavior of ego [line 11]: 2 modes",
         "  0  begins -> 1 if (self.speed < limit); 2 if not (self.speed < limit)",
-        "  1  wait [line 3] -> 1 if (self.speed < limit); 3 if not (self.speed < limit)",
+        "  1  wait [line 3] -> 1 if (self.speed < limit); 2 if not (self.speed < limit)",
         "  2  take SetBrakeAction(1) [line 8] -> the run ends if its time is over; 2",
-        "  3  take SetBrakeAction(1) [line 8] -> the run ends if its time is over; 3",
     ]
 
 

@@ -211,6 +211,25 @@ def test_bands_of_an_interval_say_all_of_what_holds(crossroads, tmp_path):
     assert not any(text.endswith("\N{HORIZONTAL ELLIPSIS}") for text in shown)
 
 
+def test_lanes_of_roles_are_coloured_by_what_they_do(crossroads, tmp_path):
+    text = (
+        "model scenic.domains.driving.model\nbehavior Drives(who):\n    try:\n        do FollowLaneBehavior(8)\n"
+        "    interrupt when (distance from self to who) < 20:\n        take SetBrakeAction(1)\n"
+        "walker = new Pedestrian\nego = new Car with behavior Drives(walker)\nterminate after 8 seconds\n"
+    )
+    query = Query(open_dataset(crossroads), Source("p.scenic", text), replace(OPTIONS, behaviors="guards"))
+    results = [each for each in query.results() if each.recording == "04-against-traffic"]
+    page = Page(write_report(query, results, tmp_path / "r").read_text(encoding="utf-8"))
+    told = [value for value in page.values("aria-label") if value.startswith("ego: ")]
+    assert told == ["ego: FollowLaneBehavior(8) 0.0-5.0 s; take SetBrakeAction(1) 5.0-8.0 s"]
+    # one colour each, which the text beside it has, too
+    lane = [value for tag, name, value in page.attributes if (tag, name) == ("rect", "class") and "chip" in value]
+    assert lane == ["chip c0", "chip c1"]
+    assert {"FollowLaneBehavior(8) 0.0-5.0 s", "take SetBrakeAction(1) 5.0-8.0 s"} <= set(page.texts)
+    where = "FollowLaneBehavior(8) (p.scenic:4:12) in Drives(walker) (p.scenic:8:29): 0.0-5.0 s"
+    assert where in page.texts
+
+
 def test_each_interval_shows_what_the_label_says_of_its_own_objects(crossroads, tmp_path):
     text = "ego = new Car\nwalker = new Pedestrian\nrequire (distance to walker) < 40\nterminate after 5 seconds\n"
     program = Source("program.scenic", f"model scenic.domains.driving.model\n{text}")

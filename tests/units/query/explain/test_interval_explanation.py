@@ -158,3 +158,19 @@ def test_what_would_do_does(tmp_path, crossroads, name):
             assert f"recording {recording} matches" in done.stdout
             tried += 1
     assert tried or name != "05_parked"
+
+
+def test_what_an_object_does_that_the_program_does_not_ask_for(tmp_path, crossroads):
+    program = (
+        "behavior Drives():\n    do FollowLaneBehavior(target_speed=12)\n"
+        "walker = new Pedestrian\nego = new Car with behavior Drives()\nterminate after 10 seconds\n"
+    )
+    lines = told(tmp_path, crossroads, program, "02-pedestrian-crosses@0s")
+    assert any("broken at 3.0 s" in line for line in lines)
+    (hint,) = [line for line in lines if "the program asks it for" in line]
+    place = HEAD.count("\n") + 2
+    assert hint == (
+        f"  = `ego` stood at 0.0 s, the program asks it for `FollowLaneBehavior(target_speed=12)` (line {place}): "
+        "speed 0 m/s, target 12 \N{PLUS-MINUS SIGN} 1.8; acceleration 0 m/s\N{SUPERSCRIPT TWO}, at least 0.3 at 3.0 s"
+    )
+    assert "ego: FollowLaneBehavior(target_speed=12) 0.0-3.0 s" in lines
