@@ -51,7 +51,7 @@ def apply(op: ArithmeticOp, *arguments: Term | float) -> Term:
     if known and op in _COMMUTE:
         args.sort(key=lambda arg: isinstance(arg, Constant))
     first, last = args[0], args[-1]
-    if known and last is known[0]:
+    if isinstance(last, Constant):
         if last.value == _NEUTRAL.get(op):
             return first
         if op is ArithmeticOp.MUL and last.value == 0 and isinstance(first, Range):

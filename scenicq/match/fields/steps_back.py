@@ -60,7 +60,8 @@ def draw_back(ways: Sequence[StepsBack], space: TrialSpace, draws: TrialDraws, r
     """
     pairs = [(one, other) for one, other in combinations(ways, 2) if one.leaf is other.leaf]
     parts = len(ways) + len(pairs) + 1
-    mine = {id(way): np.arange(number, draws.places.shape[1], parts) for number, way in enumerate(ways)}
+    count: int = draws.places.shape[1]
+    mine = {id(way): np.arange(number, count, parts) for number, way in enumerate(ways)}
     drawn = {id(way): way.draw(space, draws, mine[id(way)], rng) for way in ways}
     for number, (one, other) in enumerate(pairs, len(ways)):
         _meet(
@@ -69,7 +70,7 @@ def draw_back(ways: Sequence[StepsBack], space: TrialSpace, draws: TrialDraws, r
             space,
             draws,
             (drawn[id(one)], drawn[id(other)]),
-            np.arange(number, draws.places.shape[1], parts),
+            np.arange(number, count, parts),
         )
 
 
@@ -216,7 +217,7 @@ def steps_back(items: Sequence[Item], steps: Steps) -> list[StepsBack]:
                 beyond = _hanging_on(leaf, steps)
                 if _leads_back(node, leaf, beyond):
                     before = tuple([step for step in steps if id(step[0]) not in beyond])
-                    found.append(StepsBack(leaf, node, cast("tuple[float, float]", seen), beyond, before))
+                    found.append(StepsBack(leaf, node, seen, beyond, before))
     return found
 
 

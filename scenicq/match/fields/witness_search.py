@@ -285,7 +285,8 @@ class _Search:
         """Each draw after one step towards what is observed."""
         each = np.where(np.isfinite(tried.residuals.each), tried.residuals.each, 0.0)
         step = damped_steps(self._slopes(tried), each, self._at_ends(tried.draws.places))[0]
-        led = tried.draws.take(np.arange(tried.draws.places.shape[1]))
+        count: int = tried.draws.places.shape[1]
+        led = tried.draws.take(np.arange(count))
         led.places[self.space.moving] += step
         return led
 

@@ -116,7 +116,7 @@ def _read(part: Node, ego: int, classes: Granularity, *, proving: bool) -> tuple
                 return each
 
     body = in_said_truths(in_ego_frame(transform(node.body.condition, put_in), ego))
-    bounds = SqlBounds(columns | said_columns((body,), {ELEMENT: f"{OTHER}.attributes"}, columns))
+    bounds = SqlBounds({**columns, **said_columns((body,), {ELEMENT: f"{OTHER}.attributes"}, columns)})
     # of those who are all that is known is that some may play a role
     roles = node.excluded - 1
     few = negated or every
