@@ -155,6 +155,7 @@ STEPS: dict[str, Off] = {
         branch_and_prune, "branch_and_prune", lambda items, _: Undecided(items[0][0], "switched off")
     ),
     "trial": _set(field_solver, "find_witness", lambda *_, **__: None),
+    "ways back": _set(trials, "steps_back", lambda *_: []),
     "heading propagation": _set(field_solver, "search_directions", _at_once(_undecided)),
     "parts by a shared number": _set(decomposition, "_shared", lambda *_: None),
 }
