@@ -38,7 +38,7 @@ from scenes import STREET, compiled, drawn, label_of  # noqa: E402
 from scenicq.forest.scenario import Scenario  # noqa: E402
 from scenicq.geometry.network import Network, read_geojson  # noqa: E402
 from scenicq.match.decide import cascade, decomposition  # noqa: E402
-from scenicq.match.fields import branch_and_prune, field_solver  # noqa: E402
+from scenicq.match.fields import branch_and_prune, field_solver, trials  # noqa: E402
 from scenicq.match.linear.affine_reach import Reach  # noqa: E402
 from scenicq.match.matcher import Matcher  # noqa: E402
 from scenicq.match.options import MatchOptions  # noqa: E402
