@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -58,7 +59,8 @@ timelines = st.lists(modes, max_size=3).map(tuple)
 results = st.builds(
     Result, names, names, whole, verdicts, named, st.none() | spans, st.none() | densities, st.none() | recorded,
     timeline=st.none() | timelines,
-)  # fmt: skip
+).map(lambda each: each if each.interval is not None else replace(each, timeline=None))  # fmt: skip
+"""Results, of which intervals alone have timelines."""
 
 
 @given(results, texts)

@@ -137,7 +137,8 @@ def _where_alone(forms: Sequence[ClosedForm], ranked: Sequence[tuple[Index, Sele
         return found
 
     def evaluate(get: Get, options: MatchOptions, lookups: MapLookups) -> Evaluated:
-        known, values = alone(get), dict[Identity, Value | FloatColumn | list[Value]]()
+        known = alone(get)
+        values: dict[Identity, Value | FloatColumn | list[Value]] = {}
         holds, fails = known, np.zeros(1, np.bool_)
         for form in forms:
             found = form.evaluate(get, options, lookups)

@@ -265,13 +265,13 @@ def record(result: Result, dataset: str = "", *, every: bool = False) -> Record:
         more |= _recorded(result.recorded, series=span is not None)
     if result.lanes is not None:
         more["lanes"] = {role: StandingRecord(list(each.own), list(each.others)) for role, each in result.lanes.items()}
-    if result.timeline is not None:
-        more["timeline"] = list(result.timeline)
     if span is None:
         return FrameRecord(frame=result.frame, recording=result.recording, timestamp_us=result.timestamp_us,
                            verdict=name, correspondence=_dict(roles), witness=witness, cause=cause,
                            sensors=_dict(result.sensors), all_matches=every or UNSET, dataset=origin,
                            **more)  # fmt: skip
+    if result.timeline is not None:
+        more["timeline"] = list(result.timeline)
     frames = FramesRecord(result.frame, span.last, span.count)
     return IntervalRecord(recording=result.recording, start_us=result.timestamp_us, end_us=span.end_us, frames=frames,
                           verdict=name, correspondence=_dict(roles), witness=witness, cause=cause,
