@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +15,16 @@ from scenicq.store.remote_path import AnyPath, any_path, is_address, local_path
 
 __all__ = ["ANY_PATH", "LOCAL_PATH", "AnyPathType", "LocalPathType", "check_here", "chosen_file"]
 
+_SEPARATOR = re.compile(rf"{re.escape(os.pathsep)}(?!//)")
 
-class AnyPathType(click.Path):
+
+class _PathType(click.Path):
+    def split_envvar_value(self, rv: str) -> Sequence[str]:
+        """The paths of a variable: the colon of an address separates none."""
+        return _SEPARATOR.split(rv)
+
+
+class AnyPathType(_PathType):
     """A file or folder that may lie elsewhere."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
@@ -30,7 +41,7 @@ class AnyPathType(click.Path):
         return any_path(value)
 
 
-class LocalPathType(click.Path):
+class LocalPathType(_PathType):
     """A file or folder that is read or written on this machine only."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
