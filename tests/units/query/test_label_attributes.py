@@ -76,7 +76,7 @@ def test_others_the_nearest_and_records_read_it(dataset):
     assert found(dataset, f'{EGO}require any(o.state == "parked" for o in others(Car))\n') == {"f0"}
     assert found(dataset, f'{EGO}require nearest(Car).state == "moving"\n') == {"f1"}
     results = [*query(dataset, f"{EGO}record nearest(Car).points as points\n").results()]
-    assert [each.recorded["points"].cells for each in results] == [(3.0,), (1e17 + 16,), (None,)]
+    assert [each.recorded["points"].values for each in results] == [(3.0,), (1e17 + 16,), (None,)]
 
 
 def test_it_is_read_at_each_sample(dataset):
