@@ -47,7 +47,7 @@ DIFFERENT |= {("workspace", context): SCENE for context in CALLED}
 @cache
 def conformance() -> Any:
     """The module that asks Scenic."""
-    path = HERE.parent / "conformance" / "soft_keywords.py"
+    path = HERE.parents[1] / "tools" / "conformance" / "soft_keywords.py"
     spec = importlib.util.spec_from_file_location("soft_keywords", path)
     assert spec is not None
     assert spec.loader is not None

@@ -62,9 +62,11 @@ def test_each_program_finds_its_recording(town, name):
     assert told(records) == FOUND[name]
     assert records[-1].pop("summary")["complete"]
     for each in records:
-        assert list(each) == [
+        # a timeline is of programs with behaviors, monitors or scenarios
+        assert [key for key in each if key != "timeline"] == [
             "recording", "start_us", "end_us", "frames", "verdict", "correspondence", "witness", "open_ended", "dataset"
         ]  # fmt: skip
+        assert ("timeline" in each) == ("monitor " in (PROGRAMS / f"{name}.scenic").read_text())
         assert each["verdict"] == "match"
         assert each["open_ended"] == (name in MORE_OPTIONS)
         assert each["end_us"] - each["start_us"] == (each["frames"]["count"] - 1) * 500_000
