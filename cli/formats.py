@@ -32,7 +32,7 @@ from .report import plain
 from .table import Table, TextStream
 
 if TYPE_CHECKING:
-    import pyarrow as pa
+    pass
 
 __all__ = ["FORMATS", "SPREADSHEET_HELP", "CsvRows", "Writer", "make_writer"]
 
@@ -172,7 +172,7 @@ class _Csv:
 
 
 class _Parquet:
-    def __init__(self, sink: BinaryIO, schema: pa.Schema) -> None:
+    def __init__(self, sink: BinaryIO, schema: Any) -> None:
         import pyarrow.parquet as pq  # noqa: PLC0415 - takes long to load
 
         self._schema = schema

@@ -609,7 +609,7 @@ class CompositionGraph(ProcessGraph):
     def activities(self, frames: tuple[ProcessFrame, ...], what: Span) -> tuple[Activity, ...]:
         """What goes on from one sample to the next: what is done, and each scenario that runs."""
         found = [Activity(what)]
-        stack = [(frames, ())]
+        stack: list[tuple[tuple[ProcessFrame, ...], tuple[Span, ...]]] = [(frames, ())]
         while stack:
             inner, calls = stack.pop()
             for frame in inner:

@@ -83,8 +83,10 @@ def timeline_of(dynamics: Dynamics, times_us: NDArray[np.int64], truths: Mapping
         if here < len(path):
             situation, chosen = path[here]
             later = partial(later_sample, seconds, here)
-            now = {"due": due[here], "here": here, "later": later, "last": here == len(seconds) - 1}
-            doing.append(machine.doing(situation, values[here], chosen, **now))
+            last = here == len(seconds) - 1
+            doing.append(
+                machine.doing(situation, values[here], chosen, due=due[here], here=here, later=later, last=last)
+            )
         else:
             doing.append((None,) * count)
     found: list[ModeSegment] = []
@@ -115,6 +117,7 @@ def _path(machine: RunMachine, ways: _Ways, size: int) -> tuple[list[_Step], boo
             hopeful = {each: step for each, step in going.items() if not machine.situations[each].is_lost}
             layers.append(hopeful or going)
     over = may_match = False
+    step: _Step
     if ends:
         (rank, _), step, over = max(ends, key=lambda each: each[0])
         may_match = rank > 0

@@ -14,6 +14,7 @@ from scenicq.forest.scenario import Scenario
 from scenicq.forest.walk import features, leaves
 from scenicq.match.options import MatchOptions
 from scenicq.match.verdict import Match, WitnessValue
+from scenicq.number_ranges import expand_ranges
 from scenicq.query.execution.members import Members
 from scenicq.query.execution.results import Result
 from scenicq.temporal.atoms import AtomColumns
@@ -68,8 +69,7 @@ class ResultStretches:
     def places(self) -> NDArray[np.int64]:
         """The numbers of their samples, result by result."""
         own = np.array(self.numbers) - self.first
-        begins, sizes = self.starts[own], self.sizes[own]
-        return np.concatenate([np.arange(begin, begin + size) for begin, size in zip(begins, sizes, strict=True)])
+        return expand_ranges(self.starts[own], self.sizes[own])
 
     def bounds(self) -> NDArray[np.int64]:
         """Where the samples of each begin among `places`, and where the last ones end."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import os
 import resource
@@ -122,6 +123,7 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
     if mount is None or unmount is None or subprocess.run(command, capture_output=True, check=False).returncode:
         pytest.skip("mounting a small file system needs root")
     yield place
+    gc.collect()  # what a failed run leaves in a circle may hold a file open
     subprocess.run([unmount, str(place)], check=True)
 
 
