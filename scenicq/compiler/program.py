@@ -146,6 +146,9 @@ def _compiled(
                    ("make expressions and calls flatter",)) from None  # fmt: skip
     except ScenarioError as error:
         raise _on_map(error, network) from None
+    finally:
+        # the interpreter stays in circles until Python looks for them: what it asks keeps a dataset open
+        run.label_attributes = None
 
 
 def _start(source: Source) -> Span:

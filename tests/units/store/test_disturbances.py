@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import json
 import os
 import resource
@@ -123,7 +122,6 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
     if mount is None or unmount is None or subprocess.run(command, capture_output=True, check=False).returncode:
         pytest.skip("mounting a small file system needs root")
     yield place
-    gc.collect()  # what a failed run leaves in a circle may hold a file open
     subprocess.run([unmount, str(place)], check=True)
 
 
