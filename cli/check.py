@@ -35,7 +35,7 @@ from scenicq.store.said_values import said_types
 from .datasets import open_checked
 from .main import ERROR
 from .manual import Manual
-from .options import declared
+from .options import add_options
 from .output import writing
 from .path_type import LOCAL_PATH
 from .programs import PROGRAM_TEXT, SCENARIO, given_program
@@ -245,10 +245,10 @@ def _found(
 @click.argument("scenario", metavar="SCENARIO", type=click.Path(), required=False)
 @click.argument("dataset", metavar="[DATASET]", type=click.Path(), required=False)
 @PROGRAM_TEXT
-@declared(QUERY_OPTIONS, "run_scenario", "params")
+@add_options(QUERY_OPTIONS, "run_scenario", "params")
 @click.option("--map", "map_file", metavar="FILE", type=LOCAL_PATH, help="A GeoJSON or OpenDRIVE map.")
-@declared(QUERY_OPTIONS, "scenic", "map_defaults")
-@declared(QUERY_OPTIONS, "initial", help="Ignore behaviors and other dynamic parts.")
+@add_options(QUERY_OPTIONS, "scenic", "map_defaults")
+@add_options(QUERY_OPTIONS, "initial", help="Ignore behaviors and other dynamic parts.")
 @click.option("--forest", is_flag=True, help="Print the expression forest.")
 @click.option(
     "--modes",
@@ -258,8 +258,8 @@ def _found(
 @click.option("--draw-modes", "drawing", metavar="FILE", type=LOCAL_PATH,
               help="Draw these modes, and write them to a file: .svg.")  # fmt: skip
 @click.option("--groups", is_flag=True, help="Print the groups of jointly dependent constraints, in order.")
-@declared(QUERY_OPTIONS, "classes", help="Look at the program as `match` does with these classes.")
-@declared(QUERY_OPTIONS, "strict", help="What compiles but cannot be meant, or is never compared, is an error.")
+@add_options(QUERY_OPTIONS, "classes", help="Look at the program as `match` does with these classes.")
+@add_options(QUERY_OPTIONS, "strict", help="What compiles but cannot be meant, or is never compared, is an error.")
 @click.option(
     "--format",
     "format_",

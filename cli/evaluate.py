@@ -39,7 +39,7 @@ from scenicq.store.remote_path import AnyPath
 from .datasets import open_checked
 from .formats import CsvRows
 from .manual import Manual
-from .options import by_topic, declared
+from .options import add_options, by_topic
 from .output import choose_format, destination, writing
 from .path_type import ANY_PATH, LOCAL_PATH, chosen_file
 from .programs import read_scenario
@@ -77,7 +77,7 @@ _EXTENSIONS = {".json": "json"}
               help="Detections of a model: nuScenes results (.json), Argoverse 2 (.feather), or labels of the "
               "interchange format whose objects have a `score` (.jsonl or .parquet). Given several times, each model "
               "is also compared with those before it, on the same objects.")
-@declared(EVALUATION_OPTIONS, *EVALUATION_OPTIONS)
+@add_options(EVALUATION_OPTIONS, *EVALUATION_OPTIONS)
 @click.option("--format", "format_", metavar="NAME", type=click.Choice(_FORMATS),
               help="table, json, csv, spreadsheet (csv without formulas) or parquet.  [default: by the extension of "
               "FILE, else table]")

@@ -22,7 +22,7 @@ from scenicq.store.remote_path import AnyPath
 from .datasets import open_checked
 from .main import NOTHING, UNDECIDED
 from .manual import Manual
-from .options import ONE_FRAME, OVER_TIME, SHARED, declared, query_options
+from .options import ONE_FRAME, OVER_TIME, SHARED, add_options, query_options
 from .path_type import ANY_PATH
 from .programs import PROGRAM_TEXT, SCENARIO, given_program
 from .remarks import remarks, show_remarks
@@ -62,7 +62,7 @@ __all__ = ["explain"]
 @click.option("--smt2", metavar="DIR", type=ANY_PATH,
               help="Write the formula of each group as SMT-LIB 2 into a folder, here or elsewhere.")  # fmt: skip
 @click.option("--exit-zero", is_flag=True, help="Exit with 0 also where the frame does not match.")
-@declared(QUERY_OPTIONS, *SHARED, *OVER_TIME)
+@add_options(QUERY_OPTIONS, *SHARED, *OVER_TIME)
 @click.pass_context
 def explain(
     ctx: click.Context, scenario: str | None, dataset: str | None, frame: str | None, *, program: str | None,

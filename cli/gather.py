@@ -22,7 +22,7 @@ from scenicq.store.remote_path import AnyPath
 from .deliver import Wanted, deliver, exit_code
 from .formats import FORMATS, make_writer
 from .manual import OPEN, Manual
-from .options import declared
+from .options import add_options
 from .output import ProgressBar, choose_format, destination, writing
 from .path_type import ANY_PATH, chosen_file
 from .selections import tell_unclear
@@ -45,7 +45,7 @@ __all__ = ["gather"]
               help="Hand the matching frames on, too, in a new folder DIR; as for `match`.")  # fmt: skip
 @click.option("--report", metavar="DIR", type=ANY_PATH,
               help="Write a page with pictures of the matches, too: DIR/index.html.")  # fmt: skip
-@declared(QUERY_OPTIONS, "where", "sort")
+@add_options(QUERY_OPTIONS, "where", "sort")
 @SENSORS
 @click.option("--exit-zero", is_flag=True, help="Exit with 0 also where nothing matches, or something is undecided.")
 @click.pass_context

@@ -36,7 +36,7 @@ from .funnel import MatchSample, show_funnel
 from .main import INTERRUPTS, UNDECIDED
 from .manual import OPEN, Manual
 from .option_type import OptionType
-from .options import OVER_TIME, SHARED, by_topic, declared, query_options
+from .options import OVER_TIME, SHARED, add_options, by_topic, query_options
 from .output import ProgressBar, choose_format
 from .path_type import ANY_PATH, chosen_file
 from .pieces import LateShardError, Shard, parse_shard, run_shard
@@ -93,15 +93,15 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @click.argument("scenario", metavar="SCENARIO", type=click.Path(), required=False)
 @click.argument("dataset", metavar="DATASET", type=click.Path(), required=False)
 @PROGRAM_TEXT
-@declared(QUERY_OPTIONS, *SHARED, *OVER_TIME, "intervals", "prefilter", "jobs", "limit")
+@add_options(QUERY_OPTIONS, *SHARED, *OVER_TIME, "intervals", "prefilter", "jobs", "limit")
 @click.option("--deadline", metavar="S", type=OptionType(Amount("s", above=True)),
               help="Stop after S seconds, or 5min, 2h: what is "
               "decided by then is written, the rest is counted, and `--resume` goes on.")
-@declared(QUERY_OPTIONS, "every", "all_matches")
+@add_options(QUERY_OPTIONS, "every", "all_matches")
 @click.option("--near", metavar="K", type=OptionType(Count()), help="Show the K frames, too, that do not match but "
               "come closest, each with the tolerance under which it would; over time K recordings, each with the "
               "tolerance, the number of the program or the duration with which it would.")
-@declared(QUERY_OPTIONS, "where", "sort")
+@add_options(QUERY_OPTIONS, "where", "sort")
 @click.option("--rank", is_flag=True, help="Order matches from typical to borderline: by the density with which the "
               "program generates what the label observes.")
 @click.option("--sample", metavar="N", type=OptionType(Count()), help="Show N of the matches, drawn at random.")

@@ -14,7 +14,7 @@ from scenicq.query.execution.run import QueryOptions
 from .option_type import OptionType
 from .path_type import LOCAL_PATH
 
-__all__ = ["ONE_FRAME", "OVER_TIME", "SHARED", "by_topic", "declared", "query_options"]
+__all__ = ["ONE_FRAME", "OVER_TIME", "SHARED", "add_options", "by_topic", "query_options"]
 
 _Command = TypeVar("_Command", bound=Callable[..., Any] | click.Command)
 
@@ -26,7 +26,7 @@ ONE_FRAME = {"prefilter": False, "every": True}
 """The other options of a query about one frame."""
 
 
-def declared(options: Mapping[str, Option], *names: str, **changes: Any) -> Callable[[_Command], _Command]:
+def add_options(options: Mapping[str, Option], *names: str, **changes: Any) -> Callable[[_Command], _Command]:
     """Give a command some of the options that are declared, in the order of their declaration.
 
     Args:

@@ -18,7 +18,7 @@ from scenicq.store.remote_path import AnyPath
 from .check import networks_of
 from .manual import Manual
 from .option_type import OptionType
-from .options import declared
+from .options import add_options
 from .path_type import ANY_PATH, LOCAL_PATH
 from .programs import PROGRAM_TEXT, SCENARIO, given_program
 from .streams import say
@@ -39,7 +39,7 @@ __all__ = ["sample"]
 @click.argument("scenario", metavar="SCENARIO", type=click.Path(), required=False)
 @click.argument("dataset", metavar="[DATASET]", type=click.Path(), required=False)
 @PROGRAM_TEXT
-@declared(QUERY_OPTIONS, "run_scenario", "params")
+@add_options(QUERY_OPTIONS, "run_scenario", "params")
 @click.option("--map", "map_file", metavar="FILE", type=LOCAL_PATH, help="A GeoJSON or OpenDRIVE map.")
 @click.option("-n", "--number", metavar="N", type=OptionType(Count()), default=1, help="Scenes to draw.")
 @click.option("--seed", metavar="N", type=OptionType(SEED), default=0, help="The same seed gives the same scenes.")
@@ -49,9 +49,9 @@ __all__ = ["sample"]
     default="",
     help="Built-in requirements that need not hold: visibility, containment, collision.",
 )
-@declared(QUERY_OPTIONS, "timeout", default=PATIENCE_S, help="Seconds of the processor for one scene.")
-@declared(QUERY_OPTIONS, "scenic", "map_defaults", "lanes")
-@declared(QUERY_OPTIONS, "initial", help="Ignore behaviors and other dynamic parts.")
+@add_options(QUERY_OPTIONS, "timeout", default=PATIENCE_S, help="Seconds of the processor for one scene.")
+@add_options(QUERY_OPTIONS, "scenic", "map_defaults", "lanes")
+@add_options(QUERY_OPTIONS, "initial", help="Ignore behaviors and other dynamic parts.")
 @click.option("-o", "--output", metavar="DIR", type=ANY_PATH,
               help="Write an interchange folder with labels and map, to be ingested, here or elsewhere.")  # fmt: skip
 @click.pass_context

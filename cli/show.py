@@ -29,7 +29,7 @@ from scenicq.store.remote_path import AnyPath
 from .datasets import open_checked
 from .manual import Manual
 from .option_type import OptionType
-from .options import ONE_FRAME, OVER_TIME, SHARED, declared, query_options
+from .options import ONE_FRAME, OVER_TIME, SHARED, add_options, query_options
 from .output import destination, writing
 from .path_type import ANY_PATH, LOCAL_PATH, chosen_file
 from .programs import read_scenario
@@ -108,7 +108,7 @@ def _shot(dataset: Dataset, label: Label, scenario: Path | None, given: dict[str
 @click.option("--width", metavar="PX", type=OptionType(WIDTH), default=900, help="Width in pixels.")
 @SENSORS
 # --scenario names the program here
-@declared(QUERY_OPTIONS, *(SHARED | OVER_TIME) - {"run_scenario"})
+@add_options(QUERY_OPTIONS, *(SHARED | OVER_TIME) - {"run_scenario"})
 def show(dataset: str, frame: str, *, scenario: Path | None, output: AnyPath | None, half: float | None,
          width: int, sensors: Path | None, **given: Any) -> None:  # fmt: skip
     """Draw one frame from above: map, boxes, and what a scenario says of it.

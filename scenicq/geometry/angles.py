@@ -21,6 +21,7 @@ __all__ = [
     "normalize",
     "normalize_array",
     "rotate",
+    "rotate_array",
     "wrap",
     "wrap_array",
 ]
@@ -112,3 +113,9 @@ def rotate(x: float, y: float, angle: float) -> tuple[float, float]:
     """The vector turned counter-clockwise by an angle."""
     cos, sin = math.cos(angle), math.sin(angle)
     return x * cos - y * sin, x * sin + y * cos
+
+
+def rotate_array(xy: NDArray[np.float64], angles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """`rotate` of vectors (n, 2) by angles (n,)."""
+    cos, sin = np.cos(angles), np.sin(angles)
+    return np.column_stack([xy[:, 0] * cos - xy[:, 1] * sin, xy[:, 0] * sin + xy[:, 1] * cos])

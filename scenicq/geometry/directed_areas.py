@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 from shapely import STRtree
 
 from scenicq.geometry import shapes
-from scenicq.geometry.angles import heading_of_array
+from scenicq.geometry.angles import heading_of_array, rotate_array
 from scenicq.geometry.cell_guards import segment_distances
 from scenicq.geometry.fields import FieldCell
 from scenicq.geometry.road_cells import Outline, convex_outlines, segment_cells
 from scenicq.geometry.shapes import Bounds, Coordinates, Shape
 from scenicq.number_ranges import expand_ranges
 
-__all__ = ["ONE_HEADING", "TIE", "AreaPairs", "DirectedAreas", "DirectedLane", "distinct_pairs", "rotated"]
+__all__ = ["ONE_HEADING", "TIE", "AreaPairs", "DirectedAreas", "DirectedLane", "distinct_pairs"]
 
 TIE = 1e-9
 """Metres within which distances are the same."""
@@ -179,7 +179,7 @@ class DirectedAreas:
         segments, headings, starts = self.segments
         point, area = shapes.tree_pairs_around(self.tree, xy, np.hypot(steps[:, 0], steps[:, 1])[:, None])
         place, segment = _each_segment(point, area, starts)
-        back = xy[place] - rotated(steps[place], headings[segment])
+        back = xy[place] - rotate_array(steps[place], headings[segment])
         near = np.nonzero(segment_distances(back, segments[segment]) <= beside)[0]
         place, segment = place[near], segment[near]
         _, first = np.unique(place * len(segments) + self._rounded[1][segment], return_index=True)
@@ -220,12 +220,6 @@ class DirectedAreas:
                 own = headings[starts[area] : starts[area + 1]]
                 found = self._cells_of[area, index] = segment_cells(self._outlines[area], segments, own, index)
             yield from found
-
-
-def rotated(xy: Coordinates, angles: NDArray[np.float64]) -> Coordinates:
-    """Vectors (n, 2) turned counter-clockwise by angles (n,)."""
-    cos, sin = np.cos(angles), np.sin(angles)
-    return np.column_stack([xy[:, 0] * cos - xy[:, 1] * sin, xy[:, 0] * sin + xy[:, 1] * cos])
 
 
 def _each_segment(owner: NDArray[np.intp], area: NDArray[np.intp], starts: NDArray[np.intp]) -> AreaPairs:

@@ -16,8 +16,8 @@ from shapely import STRtree
 
 from scenicq.budget import look
 from scenicq.geometry import shapes
+from scenicq.geometry.angles import rotate_array
 from scenicq.geometry.cells import convex_parts
-from scenicq.geometry.directed_areas import rotated
 from scenicq.geometry.fields import FieldCell
 from scenicq.geometry.road_direction import ONE_HEADING, RoadDirection, distinct_pairs
 from scenicq.geometry.shapes import Bounds, Coordinates, Shape
@@ -70,7 +70,7 @@ class FollowedDirection(RoadDirection):
     ) -> tuple[NDArray[np.intp], NDArray[np.float64], Coordinates]:
         """Where a step may have led to some places, see `RoadDirection`, also off the road."""
         place, heading, back = self.base.steps_to(xy, steps)
-        off = xy - rotated(steps, np.full(len(xy), OFF_ROAD))
+        off = xy - rotate_array(steps, np.full(len(xy), OFF_ROAD))
         free = self._partly_off(np.concatenate([off, off], axis=1))
         return (
             np.concatenate([place, free]),

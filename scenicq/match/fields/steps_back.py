@@ -30,7 +30,7 @@ from scenicq.forest.nodes import (
     VectorSum,
 )
 from scenicq.forest.walk import is_leaf, leaves, postorder
-from scenicq.geometry.directed_areas import rotated
+from scenicq.geometry.angles import rotate_array
 from scenicq.geometry.road_direction import ONE_HEADING, RoadDirection
 from scenicq.match.problem.conditioned import Item
 
@@ -156,7 +156,7 @@ class StepsBack:
                     todo.append((inner, _Followed(ways.draw, ways.place - along, ways.shares)))
                 else:
                     turn = sum((_numbers(known[id(each)], count)[ways.draw] for each in step.turns), np.zeros(1))
-                    ahead = rotated(_vectors(known[id(step.ahead)], count)[ways.draw], turn)
+                    ahead = rotate_array(_vectors(known[id(step.ahead)], count)[ways.draw], turn)
                     back = _back(step.field, ways, ahead, space.use_of(step.direction))
                     todo.append((step.inner, back.take(np.sort(rng.permutation(len(back.draw))[: _WAYS * count]))))
         found: list[_Indices] = [some[:0]]

@@ -125,7 +125,7 @@ class ResultSamples:
         for some in _in_pieces([self._placed(members, each) for each in matches]):
             sizes = np.array([each.end - each.first for each in some])
             starts = np.cumsum(sizes) - sizes
-            labels = np.concatenate([np.arange(each.first, each.end) for each in some])
+            labels = expand_ranges(np.array([each.first for each in some]), sizes)
             playing = {
                 index: np.concatenate([each.members.get(index, np.full(each.end - each.first, -1)) for each in some])
                 for index in self._indices.values()

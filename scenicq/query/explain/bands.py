@@ -26,7 +26,7 @@ __all__ = [
     "bands_of",
     "columns_of",
     "conditions_over",
-    "shortened",
+    "shorten",
     "show_bands",
     "sides_over",
 ]
@@ -160,12 +160,12 @@ def show_bands(bands: Sequence[Band]) -> list[str]:
     """Bands as text: `#` true, `.` false, `?` unknown; of many samples, each character stands for several."""
     if not bands:
         return []
-    width = max(len(shortened(band.what)) for band in bands)
-    return [f"{shortened(band.what).ljust(width)}  {_drawn(band.values)}" for band in bands]
+    width = max(len(shorten(band.what)) for band in bands)
+    return [f"{shorten(band.what).ljust(width)}  {_drawn(band.values)}" for band in bands]
 
 
-def shortened(text: str) -> str:
-    """A text as long as a name in a line may be."""
+def shorten(text: str) -> str:
+    """Cut a text to what a name in a line may have."""
     return text if len(text) <= 48 else f"{text[:47]}\N{HORIZONTAL ELLIPSIS}"
 
 

@@ -12,7 +12,7 @@ from scenicq.forest.nodes import Compare, CompareOp, Feature, Logic, LogicOp, No
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.temporal import Activity, Arm, Process, Test, Wait
 from scenicq.forest.walk import postorder
-from scenicq.query.explain.bands import KnownConditions, shortened, sides_over
+from scenicq.query.explain.bands import KnownConditions, shorten, sides_over
 from scenicq.store.tracks import RecordingTracks
 from scenicq.temporal.intervals import IntervalVerdict
 from scenicq.temporal.timeline import ModeSegment, timeline_of
@@ -46,8 +46,8 @@ class RunModes:
         lines: dict[str, list[str]] = {}
         for each in self.segments:
             process = dynamics.processes[each.process]
-            who = "scenario" if process.composes else shortened(self._who(process))
-            what = "not known" if each.activity is None else shortened(_text(each.activity))
+            who = "scenario" if process.composes else shorten(self._who(process))
+            what = "not known" if each.activity is None else shorten(_text(each.activity))
             # it goes on to the sample at which something else does
             until = self.seconds[self._end(each)]
             lines.setdefault(who, []).append(f"{what} {self.seconds[each.first]:.1f}-{until:.1f} s")
@@ -72,7 +72,7 @@ class RunModes:
             line = activity.what.source.position(activity.what.start)[0]
             found.append(
                 f"`{self._who(behavior)}` {self._moved(behavior.object, since)} at {self.seconds[since]:.1f} s, "
-                f"the program asks it for `{shortened(_text(activity))}` (line {line}): "
+                f"the program asks it for `{shorten(_text(activity))}` (line {line}): "
                 f"{values or 'it shows something else'} at {self.seconds[at]:.1f} s"
             )
         return found

@@ -11,9 +11,8 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 from shapely.geometry import LineString, Point, Polygon, box
 
-from scenicq.geometry.angles import distance
+from scenicq.geometry.angles import distance, rotate_array
 from scenicq.geometry.cell_guards import Nearer, Within, half_planes, narrowed
-from scenicq.geometry.directed_areas import rotated
 from scenicq.geometry.fields import VectorField
 from scenicq.geometry.followed_direction import OFF_ROAD, FollowedDirection
 from scenicq.geometry.road_direction import DirectedLane, RoadDirection, along_lines
@@ -238,9 +237,9 @@ def test_a_step_along_a_lane_is_found_backwards(field: RoadDirection, seed: int)
         if not pairs:
             continue
         owner, turns = np.array([n for n, _ in pairs]), np.array([heading for _, heading in pairs])
-        ends = begin[owner] + rotated(steps[owner], turns)
+        ends = begin[owner] + rotate_array(steps[owner], turns)
         place, heading, back = one.steps_to(ends, steps[owner])
-        again = back + rotated(steps[owner][place], heading)
+        again = back + rotate_array(steps[owner][place], heading)
         assert np.allclose(again, ends[place], atol=1e-9), "each leads to where it is asked for"
         for n, (x, y) in enumerate(begin[owner].tolist()):
             # beside lanes a way may begin where the nearest lane's direction is: that is not looked for

@@ -167,7 +167,7 @@ for _name, _op in {"__lt__": CompareOp.LT, "__le__": CompareOp.LE, "__gt__": Com
 
 
 def _connective(op: LogicOp):
-    """Of one formula or more, two by two, as the package's `__init__.py` has it."""
+    """Connect one formula or more, two by two, as the package's `__init__.py` does."""
 
     @binding((Formula, Formula))
     def both(left, right):
