@@ -273,12 +273,14 @@ def _of_line(line: CourseLine, own: Numbers, xy: Numbers) -> tuple[Numbers, NDAr
     passes = near.passes(line.joints)
     # of each pass what is nearest, of these the passes that are soonest, and of these what is nearest
     feet = np.flatnonzero(near.away <= _least(near.away, passes)[passes] + _EQUAL_M)
-    row, segment, part, raw, away = (each[feet] for each in (near.row, near.segment, near.part, near.raw, near.away))
+    row, segment = near.row[feet], near.segment[feet]
+    part, raw, away = (each[feet] for each in (near.part, near.raw, near.away))
     late = _time_apart(line, segment, part, own[row, 1])
     soon = np.unique(passes[feet][late <= _least(late, row)[row] + SOON_S])
     mine = np.isin(passes[feet], soon)
     mine &= away <= _least(np.where(mine, away, np.inf), row)[row] + _EQUAL_M
-    row, segment, part, raw, away = (each[mine] for each in (row, segment, part, raw, away))
+    row, segment = row[mine], segment[mine]
+    part, raw, away = (each[mine] for each in (part, raw, away))
 
     sign = own[row, 2]
     ahead = (line.s[segment] + part * line.length[segment] - own[row, 0]) * sign

@@ -39,8 +39,8 @@ def course_columns(
     courses = dict(zip(there.tolist(), track_courses(network, times_s[there], places, GAP_S), strict=True))
     found = measure([courses.get(each, NO_COURSE) for each in ego.tolist()], np.column_stack((objects.x, objects.y)))
     columns: dict[str, Numbers] = {}
-    for name, (low, high) in (("ego_along", found.along), ("ego_beside", found.beside)):
-        low, high = (np.where(np.isinf(end), np.nan, end) for end in (low, high))
+    for name, ends in (("ego_along", found.along), ("ego_beside", found.beside)):
+        low, high = (np.where(np.isinf(end), np.nan, end) for end in ends)
         value = columns[name] = np.where(np.isnan(low), high, low)
         columns[f"{name}_less"] = value - low
         columns[f"{name}_more"] = high - value

@@ -457,7 +457,8 @@ class ConditionReader:
             }
             attributes = {index: f"{alias}.{prefix}attributes" for index, (alias, prefix) in aliases.items()}
             own = [(index, name) for index in aliases for name in self.scenario.objects[index].properties]
-            columns |= said_columns(self._said, attributes, own) | course_column(self.scenario)
+            columns |= said_columns(self._said, attributes, own)
+            columns |= course_column(self.scenario)
             self._bounds[objects] = SqlBounds(columns, self._nearest)
         return self._bounds[objects]
 

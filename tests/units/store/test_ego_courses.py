@@ -1,6 +1,5 @@
 """Columns of where objects are on the ego's course: those that a query measures, with null where there is no end."""
 
-import itertools
 import math
 from pathlib import Path
 
@@ -63,9 +62,8 @@ def test_the_columns_are_what_a_query_measures(tmp_path: Path, network: Network)
         assert course is not None
         found = measure([course], np.array([(x, y)]))
         for (value, less, more), (low, high) in zip(
-            itertools.batched(columns, 3) if hasattr(itertools, "batched") else (columns[:3], columns[3:]),
-            (found.along, found.beside), strict=True,
-        ):  # fmt: skip
+            (columns[:3], columns[3:]), (found.along, found.beside), strict=True
+        ):
             unknown += less is None or more is None
             ends = (-math.inf if less is None else value - less), (math.inf if more is None else value + more)
             assert ends == pytest.approx((low[0], high[0]), abs=1e-9)
