@@ -11,7 +11,7 @@ from scenicq.compiler.values import Instance, ModelValue, Module, describe, fail
 from scenicq.errors import ScenarioError, Span, similar
 from scenicq.geometry.elements import Lane, NetworkElement
 from scenicq.geometry.network import Network
-from scenicq.syntax.hints import BIKE_LANES, MOVES, STANDS, TURNS
+from scenicq.syntax.hints import BIKE_LANES_HINT, MOVING_HINT, STANDING_HINT, TURNING_HINT
 
 __all__ = ["unavailable_name", "unknown_attribute", "unknown_name"]
 
@@ -97,7 +97,8 @@ _BY_NAME = {
     "distance": "`distance from a to b` has no brackets", "dist": "`distance from a to b` is the distance",
     "angle": "`angle from a to b` has no brackets", "velocity": "`X.velocity` is that of an object X",
     "speed": "`X.speed` is that of an object X", "heading": "`X.heading` is that of an object X",
-    "parked": STANDS, "stopped": STANDS, "moving": MOVES, "turning": TURNS, "bikeLane": BIKE_LANES,
+    **dict.fromkeys(("parked", "stopped"), STANDING_HINT), "moving": MOVING_HINT, "turning": TURNING_HINT,
+    "bikeLane": BIKE_LANES_HINT,
     "oncoming": "`facing Range(160, 200) deg relative to ego.heading`",
     "lane": "`X.lane` is the lane of an object X", "leftLane": "`X.laneSection.laneToLeft` is the lane left of X's",
     "rightLane": "`X.laneSection.laneToRight` is the lane right of X's",
@@ -119,8 +120,8 @@ _BESIDE = re.compile(
 _RATE = "`angularSpeed` is how fast it turns, in radians a second"
 _BY_ATTRIBUTE = {
     "yawrate": _RATE, "angularvelocity": _RATE, "turnrate": _RATE, "accel": "`acceleration` is along the course",
-    "isparked": STANDS, "parked": STANDS, "isstopped": STANDS, "stopped": STANDS, "isstationary": STANDS,
-    "ismoving": MOVES, "moving": MOVES,
+    **dict.fromkeys(("isparked", "parked", "isstopped", "stopped", "isstationary"), STANDING_HINT),
+    **dict.fromkeys(("ismoving", "moving"), MOVING_HINT),
     "category": "`new Bus` asks for a class", "type": "`new Bus` asks for a class",
     "occluded": "`beyond Y by Range(2, 30)` places an object where Y hides it from the ego",
     "isoccluded": "`beyond Y by Range(2, 30)` places an object where Y hides it from the ego",
@@ -186,7 +187,7 @@ def unknown_attribute(value: ModelValue, name: str, known: set[str], place: str,
         has = ", ".join(f"`{each}`" for each in sorted(known) if not _ASIDE.search(each))
         hints = (f"`{called}` is what Scenic calls them",) if called in known else (f"it has {has}",)
     if isinstance(value, Network) and name in ("bikeLanes", "bikeLane", "bicycleLanes"):
-        hints = (BIKE_LANES,)
+        hints = (BIKE_LANES_HINT,)
     if is_thing and (said := _BY_ATTRIBUTE.get(name.replace("_", "").lower())):
         hints = (said,)
     if is_thing and not hints:
