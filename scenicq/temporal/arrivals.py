@@ -289,7 +289,7 @@ class Arrivals:
         look()
         matcher = scene.search.rest
         shown, names = label(scene.scenario, members, relevant_properties(scene.scenario, self.match))
-        verdict = matcher.match(shown, given=dict(names))
+        verdict = matcher.match(shown, fixed_roles=dict(names))
         return int(TRUE if isinstance(verdict, Match) else FALSE if isinstance(verdict, NoMatch) else UNKNOWN)
 
 

@@ -425,7 +425,7 @@ def _result(label: Label, verdict: Verdict, own_lanes: OwnLanes | None) -> Resul
 
 def _every_match(matcher: Matcher, label: Label, among: Candidates | None) -> list[Verdict]:
     """Every correspondence by which a label matches and whether there may be more, or else why none does."""
-    return [finding.verdict for finding in matcher.findings(label, among=among)]
+    return [finding.verdict for finding in matcher.findings(label, candidates=among)]
 
 
 def every_label(dataset: Dataset, block: Block, *, motion: bool = False) -> Iterator[Label]:

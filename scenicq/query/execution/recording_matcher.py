@@ -413,7 +413,7 @@ class RecordingMatcher:
             for index, member in who.members.items()
             if not block.is_ego(member)
         }
-        return self._search_of(int(starts.table.outcomes[number])).matcher.match(known.label, given=given)
+        return self._search_of(int(starts.table.outcomes[number])).matcher.match(known.label, fixed_roles=given)
 
 
 def _objects_of(block: TrackBlock, labels: NDArray[np.int64]) -> NDArray[np.int64]:

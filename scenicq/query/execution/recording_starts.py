@@ -59,7 +59,7 @@ def few_findings(
         among: What is known of who may play whom.
     """
     findings: list[Finding] = []
-    for finding in matcher.findings(label, among=among, every_open=True):
+    for finding in matcher.findings(label, candidates=among, every_open=True):
         if finding.plan is not None:
             kind = "match" if isinstance(finding.verdict, Match) else "open"
             if starts[kind] >= LIMITS.recording_starts:

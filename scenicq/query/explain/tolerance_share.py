@@ -86,7 +86,7 @@ def _fails(matcher: Matcher, label: Label, result: Result) -> bool:
     # others come later
     there = {each.name for each in matcher.scenario.objects}
     roles = {name: member for name, member in roles_in(label, result).items() if name in there}
-    return isinstance(matcher.match(label, given=roles), NoMatch)
+    return isinstance(matcher.match(label, fixed_roles=roles), NoMatch)
 
 
 def _exact_places(tolerance: Tolerance) -> Tolerance:

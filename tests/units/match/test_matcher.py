@@ -167,8 +167,8 @@ def test_given_roles_restrict_the_search():
     scenario = compiled(HEADER + "ego = new Car\nother = new Car ahead of ego by Range(1, 30)")
     label = frame(car("a", 1.75, 60.0), car("b", 1.75, 70.0), car("c", 5.25, 70.0))
     matcher = Matcher(scenario, MatchOptions(tolerance=EXACT))
-    assert matcher.match(label, given={"other": "b"}).correspondence["other"] == "b"
-    assert isinstance(matcher.match(label, given={"other": "c"}), NoMatch)
+    assert matcher.match(label, fixed_roles={"other": "b"}).correspondence["other"] == "b"
+    assert isinstance(matcher.match(label, fixed_roles={"other": "c"}), NoMatch)
     assert [match.correspondence["other"] for match in matcher.matches(label)] == ["a", "b"]
 
 

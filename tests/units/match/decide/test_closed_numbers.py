@@ -116,7 +116,7 @@ def test_batches_find_what_labels_alone_find(name, options):
         for seed in range(8)
         for label in labels(scenario, seed)
     ]
-    alone = [matcher.match(label, among=among) for label, among in asked]
+    alone = [matcher.match(label, candidates=among) for label, among in asked]
     together = list(matcher.match_all(asked))
     assert [*map(str, together)] == [*map(str, alone)]
     assert {Match, NoMatch} >= {type(verdict) for verdict in together}

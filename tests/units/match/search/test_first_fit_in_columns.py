@@ -95,7 +95,7 @@ def test_the_same_is_found_together(name, options):
     scenario = compiled(HEADER + CASES[name], STREET)
     matcher = Matcher(scenario, options)
     asked = with_candidates(matcher.scenario, options, labels(scenario, range(4)))
-    alone = [matcher.match(label, among=among) for label, among in asked]
+    alone = [matcher.match(label, candidates=among) for label, among in asked]
     together = list(matcher.match_all(asked))
     assert together == alone
     assert list(map(str, together)) == list(map(str, alone))
@@ -104,7 +104,7 @@ def test_the_same_is_found_together(name, options):
     brief = list(matcher.match_all(asked, details=False))
     assert [_in_brief(each) for each in brief] == [_in_brief(each) for each in alone]
     # a search by itself comes as far as first fit
-    searched = [next(matcher.findings(label, among=among)).verdict for label, among in asked]
+    searched = [next(matcher.findings(label, candidates=among)).verdict for label, among in asked]
     assert [_in_brief(each) for each in searched if isinstance(each, NoMatch)] == [
         _in_brief(each) for each in alone if isinstance(each, NoMatch)
     ]
@@ -125,7 +125,7 @@ def test_what_surely_does_not_match_is_not_searched_one_by_one(name, monkeypatch
         away = tuple(replace(each, x=each.x + 500.0) for each in label.objects)
         found.append(replace(label, objects=(*away, *(replace(each, id=f"{each.id}-too") for each in away))))
     asked = with_candidates(matcher.scenario, options, [each for each in found if each.objects])
-    told = [_in_brief(matcher.match(label, among=among)) for label, among in asked]
+    told = [_in_brief(matcher.match(label, candidates=among)) for label, among in asked]
     alone = []
     monkeypatch.setattr(Matcher, "_findings", lambda *args: alone.append(args))
     for details in (False, True):
