@@ -140,7 +140,7 @@ class Matcher:
         with suppress(Exhausted), time_for_all, limited(self.options.timeout_s * len(labels) / 2):
             for fit, rows in self.plans.first_fits(labels, fixed_roles).items():
                 for batch in fit.fill(rows, self.options, lookups):
-                    found.update(self._verdicts.of_batch(fit, batch, lookups if details else None))
+                    found.update(self._verdicts.batch_verdicts(fit, batch, lookups if details else None))
         for number, label in enumerate(labels):
             verdict = found.get(number)
             if verdict is None:
@@ -162,7 +162,7 @@ class Matcher:
         for ego in possible_egos(self.scenario, label, self.options):
             roles = prepare_label(self.scenario, label, ego, self.options, fixed_roles or {}, candidates)
             if isinstance(roles, Cause):
-                rest.append((0, Finding(self._verdicts.excluded(label, ego, roles))))
+                rest.append((0, Finding(self._verdicts.without_candidates(label, ego, roles))))
                 continue
             search = LabelSearch(self.scenario, self.options, roles, self.ask, reporter, lookups or MapLookups())
             ended: Exhausted | None = None
@@ -174,7 +174,7 @@ class Matcher:
                     yield finding
             except Exhausted as error:
                 ended = error
-            weight, verdict = self._verdicts.without_match(label, search, ended)
+            weight, verdict = self._verdicts.weigh_failed_search(label, search, ended)
             rest.append((weight, Finding(verdict, search)))
             if reported > self.options.correspondences:
                 break
