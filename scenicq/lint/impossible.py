@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from scenicq.errors import Diagnostic
 from scenicq.forest.bounds import may_hold
-from scenicq.forest.inline import assemble
+from scenicq.forest.inline import inline_scenario
 from scenicq.forest.interpret import OnMap
 from scenicq.forest.nodes import Constant, Node
 from scenicq.forest.scenario import Requirement, Scenario, ScenarioObject
@@ -41,7 +41,7 @@ def _impossible(scenario: Scenario, *, real: bool) -> Iterator[Diagnostic]:
         requirements=tuple(each for each in scenario.requirements if not _is_about(each, noisy)),
         soft=(),
     )
-    for check in assemble(plain, frozenset()).checks:
+    for check in inline_scenario(plain, frozenset()).checks:
         if check.defined or check.built_in is not None or not (real or _is_free_of_maps(check.condition)):
             continue
         if not may_hold(check.condition):
