@@ -16,7 +16,7 @@ from scenicq.importers.fields import InvalidError
 from scenicq.importers.folders import readable
 from scenicq.importers.layouts import ARGOVERSE2_FILES
 from scenicq.importers.report import Report
-from scenicq.importers.specification import specification
+from scenicq.importers.specification import load_specification
 
 __all__ = ["POSE", "Images", "calibration_of", "check_pose", "nearest", "views_of"]
 
@@ -118,7 +118,7 @@ def _mounts(
 
 def _read(file: Path, columns: Mapping[str, str], report: Report) -> dict[str, Any]:
     """Columns of a file of the calibration; what is not read is counted."""
-    counter = specification("argoverse2").column_counter(f"calibration/{file.name}", report)
+    counter = load_specification("argoverse2").column_counter(f"calibration/{file.name}", report)
     return read_feather(file, columns, count=counter)
 
 

@@ -13,7 +13,7 @@ from typing import Any
 from scenicq.errors import DataError, Diagnostic
 from scenicq.importers.argoverse2 import archive_of
 from scenicq.importers.argoverse2_map import read_archive
-from scenicq.importers.base import ClassNames, OpenedSource, Options, read_maps
+from scenicq.importers.base import ClassNames, ImportOptions, OpenedSource, read_maps
 from scenicq.importers.by_file import RecordingFiles, by_file_source, missing, take_map
 from scenicq.importers.columnar import read_parquet
 from scenicq.importers.fields import InvalidError
@@ -21,7 +21,7 @@ from scenicq.importers.layouts import argoverse2_scenarios
 from scenicq.importers.motion import heading_of_yaw
 from scenicq.importers.recording_checks import radians
 from scenicq.importers.report import Report
-from scenicq.importers.specification import specification
+from scenicq.importers.specification import load_specification
 from scenicq.store.classes import taxonomy
 from scenicq.store.labels import Label, LabelObject
 
@@ -46,7 +46,7 @@ class Argoverse2Forecasting:
         """Whether the path is a scenario's folder, or one that holds them at up to two levels."""
         return bool(argoverse2_scenarios(path))
 
-    def read(self, path: Path, options: Options, report: Report) -> OpenedSource:
+    def read(self, path: Path, options: ImportOptions, report: Report) -> OpenedSource:
         """Open scenarios; each is a recording.
 
         Raises:
@@ -77,7 +77,7 @@ def _name(file: Path) -> str:
 
 def _read_scenario(place: RecordingFiles, classes: ClassNames, report: Report) -> list[tuple[Label, str]]:
     file = place.files[0]
-    known = specification("argoverse2-forecasting")
+    known = load_specification("argoverse2-forecasting")
     known.count_files((each.name for each in file.parent.iterdir()), report)
     rows = read_parquet(file, _COLUMNS, _OPTIONAL, count=known.column_counter(_TABLE, report))
     steps: dict[int, list[LabelObject]] = {}

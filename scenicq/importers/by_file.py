@@ -11,7 +11,7 @@ from typing import Any
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.geometry.features import MapFeature, ProblemSink
-from scenicq.importers.base import ClassNames, Entry, Labels, OpenedSource
+from scenicq.importers.base import ClassNames, LabelChecker, OpenedSource, RecordingEntry
 from scenicq.importers.folders import readable
 from scenicq.importers.recording_checks import tell_order
 from scenicq.importers.report import Report
@@ -60,7 +60,7 @@ class FileReader:
     classes: Mapping[str, str]
     make: Make
 
-    def recordings(self, labels: Labels, report: Report) -> Iterator[RecordingColumns]:
+    def recordings(self, labels: LabelChecker, report: Report) -> Iterator[RecordingColumns]:
         """The recordings in order of their names."""
         classes = ClassNames(self.classes, report)
         for place in self.places:
@@ -71,7 +71,7 @@ class FileReader:
                     report.left_out("recording", diagnostic.code, diagnostic.message, hints=diagnostic.hints)
                 continue
             tell_order(place.name, [label.timestamp_us for label, _ in made], report, numbered=True)
-            if (recording := labels.recording(place.name, made)) is not None:
+            if (recording := labels.check_labels(place.name, made)) is not None:
                 yield recording
 
 
@@ -105,7 +105,7 @@ def by_file_source(
         name=readable(name),
         maps=maps,
         entries=tuple(
-            Entry(
+            RecordingEntry(
                 place.name,
                 _size(place.files[0]) // object_bytes if place.weight is None else place.weight,
                 place.digest or content_digest(place.files, place.options),

@@ -9,7 +9,7 @@ from typing import Any
 from scenicq.geometry.camera import Camera
 from scenicq.importers import fields
 from scenicq.importers.fields import InvalidError, Record
-from scenicq.importers.motion import Quaternion, quaternion, unit_quaternion
+from scenicq.importers.motion import Quaternion, pose_of_quaternion, unit_quaternion
 from scenicq.store.camera_rows import camera_problem
 
 __all__ = ["CAMERA_KEYS", "Mount", "Pose", "camera_of", "pose_of", "posed", "sound_camera"]
@@ -65,7 +65,8 @@ def posed(mount: Mount, vehicle: Pose, width: int, height: int) -> Camera:
         a * g - b * h + c * e + d * f,
         a * h + b * g - c * f + d * e,
     )
-    return sound_camera(Camera(width, height, mount.intrinsics, quaternion(a, b, c, d, origin).place(place), turned))
+    position = pose_of_quaternion(a, b, c, d, origin).transform_point(place)
+    return sound_camera(Camera(width, height, mount.intrinsics, position, turned))
 
 
 def sound_camera(camera: Camera) -> Camera:

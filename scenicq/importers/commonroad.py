@@ -13,7 +13,7 @@ from xml.etree.ElementTree import Element
 
 from scenicq.geometry.angles import direction
 from scenicq.geometry.features import MapFeature, ProblemSink
-from scenicq.importers.base import ClassNames, OpenedSource, Options, read_maps
+from scenicq.importers.base import ClassNames, ImportOptions, OpenedSource, read_maps
 from scenicq.importers.by_file import RecordingFiles, by_file_source, missing, take_map
 from scenicq.importers.commonroad_map import lanelet_features
 from scenicq.importers.ego_choice import Moment, ego_facts, with_egos
@@ -22,7 +22,7 @@ from scenicq.importers.layouts import commonroad_files
 from scenicq.importers.motion import heading_of_yaw
 from scenicq.importers.recording_checks import radians
 from scenicq.importers.report import Report
-from scenicq.importers.specification import specification
+from scenicq.importers.specification import load_specification
 from scenicq.importers.xml_tree import attribute, number, read_xml
 from scenicq.store.classes import taxonomy
 from scenicq.store.labels import Label, LabelObject
@@ -43,7 +43,7 @@ class CommonRoad:
         """Whether the path is such a file or a folder of them."""
         return bool(commonroad_files(path))
 
-    def read(self, path: Path, options: Options, report: Report) -> OpenedSource:
+    def read(self, path: Path, options: ImportOptions, report: Report) -> OpenedSource:
         """Open scenarios: their maps are read here, obstacles in turn.
 
         Raises:
@@ -76,7 +76,7 @@ def _read_map(file: Path, on_problem: ProblemSink, report: Report) -> tuple[MapF
 def _read_scenario(place: RecordingFiles, classes: ClassNames, report: Report) -> list[tuple[Label, str]]:
     file = place.files[0]
     root = read_xml(file)
-    specification("commonroad").count_xml(root, report)
+    load_specification("commonroad").count_xml(root, report)
     step_s = _step(root)
     if step_s is None:
         report.left_out("recording", "record-invalid", f"{file.name}: `timeStepSize` is not a positive number")

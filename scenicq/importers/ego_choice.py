@@ -45,7 +45,7 @@ def with_egos(
 
     Args:
         moments: The frames.
-        choice: `Options.ego`.
+        choice: `ImportOptions.ego`.
         recording: Name of the recording.
         map_name: Name of its map.
         place: Of the recording in the source, for messages.

@@ -15,7 +15,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from scenicq.errors import DataError
-from scenicq.importers.base import ClassNames, OpenedSource, Options, read_maps
+from scenicq.importers.base import ClassNames, ImportOptions, OpenedSource, read_maps
 from scenicq.importers.by_file import RecordingFiles, by_file_source, missing, take_map
 from scenicq.importers.ego_choice import Moment, ego_facts, with_egos
 from scenicq.importers.fields import InvalidError
@@ -25,7 +25,7 @@ from scenicq.importers.layouts import INTERACTION_PARTS, interaction_files
 from scenicq.importers.motion import heading_of_yaw
 from scenicq.importers.recording_checks import radians
 from scenicq.importers.report import Report
-from scenicq.importers.specification import specification
+from scenicq.importers.specification import load_specification
 from scenicq.store.classes import taxonomy
 from scenicq.store.labels import Label, LabelObject
 
@@ -44,7 +44,7 @@ class Interaction:
         """Whether the path is the dataset, a scene's folder or one above."""
         return bool(interaction_files(path))
 
-    def read(self, path: Path, options: Options, report: Report) -> OpenedSource:
+    def read(self, path: Path, options: ImportOptions, report: Report) -> OpenedSource:
         """Open track files; each is a recording.
 
         Raises:
@@ -92,7 +92,7 @@ def _places(file: Path, root: Path, scene: str, name: str, choice: str, report: 
     cases = [cases_of(each) for each in both]
     for each, found in zip(both, cases, strict=True):
         rows = sum(case.rows for case in found.values())
-        specification("interaction").count_columns("", columns_of(each), report, rows)
+        load_specification("interaction").count_columns("", columns_of(each), report, rows)
     for case in dict.fromkeys(case for found in cases for case in found):
         found = [each.get(case, Case()) for each in cases]
         yield RecordingFiles(

@@ -20,7 +20,7 @@ from scenicq.importers.ego_choice import middle
 from scenicq.importers.fields import NO_MAP, InvalidError, whole
 from scenicq.importers.recording_checks import radians
 from scenicq.importers.report import Report
-from scenicq.importers.specification import specification
+from scenicq.importers.specification import load_specification
 from scenicq.importers.typed_rows import (
     ABSENT,
     FullText,
@@ -78,7 +78,7 @@ class _Line(Struct, kw_only=True, forbid_unknown_fields=True):
     sensors: dict[str, Raw] | None = None
 
 
-_KNOWN = specification("interchange")
+_KNOWN = load_specification("interchange")
 _LINE = RowType(_Line, _KNOWN, "labels")
 _OTHER = {"heading": "yaw", "yaw": "heading"}
 _EGOS = {angle: RowType(_Ego, _KNOWN, "labels/ego", unread=other) for angle, other in _OTHER.items()}

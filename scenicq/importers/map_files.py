@@ -22,7 +22,7 @@ from scenicq.geometry.features import (
 )
 from scenicq.importers.fields import InvalidError, check_characters
 from scenicq.importers.report import Report
-from scenicq.importers.specification import specification
+from scenicq.importers.specification import load_specification
 from scenicq.store.map_validation import properties_problem
 from scenicq.store.value_rules import LONGEST_NAME, json_object
 from scenicq.store.wkb import FARTHEST_M
@@ -82,7 +82,7 @@ def read_geojson_maps(files: Mapping[str, Path], report: Report) -> dict[str, tu
         problems: list[tuple[str, str]] = []
         document = load_geojson(files[name])
         features = read_geojson(document, _collector(problems), name=str(files[name]))
-        specification("geojson").count_json(document, report)
+        load_specification("geojson").count_json(document, report)
         references = set(dangling(features)) if problems else set[tuple[str, str]]()
         for problem in problems:
             message = f"{files[name].name}: element `{problem[0]}`: {problem[1]}"

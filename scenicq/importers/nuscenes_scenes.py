@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.geometry.camera import Camera
-from scenicq.importers.base import ClassNames, Labels
+from scenicq.importers.base import ClassNames, LabelChecker
 from scenicq.importers.nuscenes_boxes import Boxes
 from scenicq.importers.report import Report
 from scenicq.store.columns import MemberColumns, RecordingColumns, to_json
@@ -107,7 +107,7 @@ class SceneReader:
     scenes: tuple[SceneContent, ...] = field(repr=False)
     classes: Mapping[str, str]
 
-    def recordings(self, labels: Labels, report: Report) -> Iterator[RecordingColumns]:
+    def recordings(self, labels: LabelChecker, report: Report) -> Iterator[RecordingColumns]:
         """The recordings in order of their names."""
         classes = ClassNames(self.classes, report)
         for scene in self.scenes:
@@ -116,7 +116,7 @@ class SceneReader:
                     message = f"{instant.place}: sample `{instant.token}` has no sound ego pose"
                     report.left_out("label", "record-invalid", message)
             places = [instant.place for instant in scene.instants if instant.pose is not None]
-            if (found := labels.sound(_columns(scene, classes), places)) is not None:
+            if (found := labels.check_columns(_columns(scene, classes), places)) is not None:
                 yield found
 
 

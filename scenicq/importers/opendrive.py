@@ -20,7 +20,7 @@ from xml.etree.ElementTree import Element
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.importers.report import Report
-from scenicq.importers.specification import specification
+from scenicq.importers.specification import load_specification
 from scenicq.importers.xml_tree import read_xml
 from scenicq.store.atomic_files import whole_file, write_whole
 
@@ -63,7 +63,7 @@ def _tell_left_out(file: Path, report: Report) -> None:
     root = read_xml(file)
     for lost in _dangling(root):
         report.kept("map element", "map-invalid", f"{file.name}: {lost}")
-    known = specification("opendrive")
+    known = load_specification("opendrive")
     known.count_xml(root, report)
     if any(each.get("type") == "crosswalk" for each in root.iter("object")):
         message = f"{file.name}: Scenic's parser reads no crossings; the map has some"

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.importers import fields
-from scenicq.importers.base import ClassNames, OpenedSource, Options, read_maps
+from scenicq.importers.base import ClassNames, ImportOptions, OpenedSource, read_maps
 from scenicq.importers.by_file import RecordingFiles, by_file_source, missing
 from scenicq.importers.ego_choice import Moment, ego_facts, with_egos
 from scenicq.importers.fields import NO_MAP, InvalidError, Record
@@ -24,7 +24,7 @@ from scenicq.importers.openlabel_objects import FrameObjects, objects_of
 from scenicq.importers.openlabel_systems import Systems, first_vehicle
 from scenicq.importers.recording_checks import tell_order
 from scenicq.importers.report import Report
-from scenicq.importers.specification import specification
+from scenicq.importers.specification import load_specification
 from scenicq.importers.timestamps import microseconds
 from scenicq.store.classes import taxonomy
 from scenicq.store.labels import Label, LabelObject
@@ -46,7 +46,7 @@ class OpenLabel:
         """Whether the path is such a file or a folder of them."""
         return bool(openlabel_files(path))
 
-    def read(self, path: Path, options: Options, report: Report) -> OpenedSource:
+    def read(self, path: Path, options: ImportOptions, report: Report) -> OpenedSource:
         """Open files.
 
         Raises:
@@ -138,7 +138,7 @@ def _read_recording(place: RecordingFiles, classes: ClassNames, report: Report) 
     frames: list[_Frame] = []
     for file in place.files:
         content = _content(file)
-        specification("openlabel").count_json(content, report)
+        load_specification("openlabel").count_json(content, report)
         prefix = place.name if len(place.files) == 1 else f"{place.name}/{file.stem}"
         frames += _read_frames(content, file.name, prefix, classes, report)
     timed = _timed(frames, len(place.files) > 1, place.files[0].name, report)

@@ -10,7 +10,7 @@ from typing import Any
 from scenicq.importers import fields
 from scenicq.importers.base import ClassNames
 from scenicq.importers.fields import InvalidError, Record
-from scenicq.importers.motion import euler, quaternion
+from scenicq.importers.motion import pose_of_euler_angles, pose_of_quaternion
 from scenicq.importers.openlabel_systems import Systems
 from scenicq.importers.recording_checks import radians
 from scenicq.importers.report import Report
@@ -143,14 +143,14 @@ def _box(cuboid: Record, system: str | None, systems: Systems, report: Report) -
     at = (values[0], values[1], values[2])
     if count == 10:
         x, y, z, w = values[3:7]
-        own = quaternion(w, x, y, z, at)
+        own = pose_of_quaternion(w, x, y, z, at)
     else:
         roll, pitch, yaw = (radians(angle, report) for angle in values[3:6])
-        own = euler(roll, pitch, yaw, at)
+        own = pose_of_euler_angles(roll, pitch, yaw, at)
     length, *others = values[-3:]
     if min(values[-3:]) <= 0:
         raise InvalidError("its size is not positive")
-    box = systems.pose(system).then(own)
+    box = systems.pose(system).compose(own)
     # In the frame of a camera the box stands on its y axis.
     upright = abs(box.z[2]) >= abs(box.y[2])
     width, height = others if upright else reversed(others)

@@ -21,7 +21,7 @@ from msgspec import structs
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.garbage import without_collector
-from scenicq.importers.base import Entry, Labels, Reader
+from scenicq.importers.base import LabelChecker, RecordingEntry, RecordingReader
 from scenicq.importers.recording_checks import tell_recording
 from scenicq.importers.report import MOST_TOLD, Report
 from scenicq.processes import Lost, Workers, as_many_as_pay
@@ -100,7 +100,7 @@ class RecordingTask:
 
     name: str
     fingerprint: str
-    reader: Reader = field(repr=False)
+    reader: RecordingReader = field(repr=False)
     old: SegmentPlace | None = None
 
 
@@ -121,7 +121,7 @@ class Job:
     taken: frozenset[tuple[str, str]] = frozenset()
 
 
-def fingerprint(context: Sequence[str], entries: Sequence[Entry], taken: frozenset[tuple[str, str]]) -> str:
+def fingerprint(context: Sequence[str], entries: Sequence[RecordingEntry], taken: frozenset[tuple[str, str]]) -> str:
     """What changes with everything that a segment, or a recording of it, depends on, but for their maps.
 
     Which map a recording is on is known when it is read (`is_on_maps`).
@@ -242,7 +242,7 @@ def _read(
     """Read a recording from the source."""
     report = Report(strict=world.strict)
     maps: dict[str, str] = {}
-    for found in share.reader.recordings(Labels(world.maps.keys(), report, job.taken), report):
+    for found in share.reader.recordings(LabelChecker(world.maps.keys(), report, job.taken), report):
         tell_recording(found, report)
         writer.add(found, indexes.of(found.map))
         on_recording(found.name, len(found.frames))

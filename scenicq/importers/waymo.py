@@ -14,7 +14,7 @@ from pathlib import Path
 
 from scenicq.errors import DataError
 from scenicq.geometry.features import MapFeature
-from scenicq.importers.base import ClassNames, OpenedSource, Options, read_maps
+from scenicq.importers.base import ClassNames, ImportOptions, OpenedSource, read_maps
 from scenicq.importers.by_file import RecordingFiles, by_file_source, map_sink, missing
 from scenicq.importers.fields import InvalidError
 from scenicq.importers.layouts import waymo_files
@@ -22,7 +22,7 @@ from scenicq.importers.motion import heading_of_yaw
 from scenicq.importers.protobuf import Message, parse, signed
 from scenicq.importers.recording_checks import radians
 from scenicq.importers.report import Report
-from scenicq.importers.specification import specification
+from scenicq.importers.specification import load_specification
 from scenicq.importers.tfrecord import read_record, records
 from scenicq.importers.waymo_map import LANE_WIDTH_M, scenario_features
 from scenicq.store.classes import taxonomy
@@ -50,7 +50,7 @@ class Waymo:
         """Whether the path is such a file or a folder of them."""
         return bool(waymo_files(path))
 
-    def read(self, path: Path, options: Options, report: Report) -> OpenedSource:
+    def read(self, path: Path, options: ImportOptions, report: Report) -> OpenedSource:
         """Open files: their scenarios are listed and their maps are read; tracks are read in turn.
 
         Raises:
@@ -129,7 +129,7 @@ def _read_scenario(place: RecordingFiles, classes: ClassNames, report: Report) -
     except InvalidError as error:
         report.left_out("recording", "record-invalid", f"{where}: {error}")
         return []
-    specification("waymo").count_message(scenario, report)
+    load_specification("waymo").count_message(scenario, report)
     members: list[dict[int, LabelObject]] = []
     for number, value in enumerate(tracks):
         try:
@@ -152,7 +152,7 @@ def _read_scenario(place: RecordingFiles, classes: ClassNames, report: Report) -
 
 
 def _track(track: Message, is_ego: bool, classes: ClassNames, report: Report, where: str) -> dict[int, LabelObject]:
-    known = specification("waymo")
+    known = load_specification("waymo")
     known.count_message(track, report, _AT_TRACK)
     kind = signed(track.get(2, [0])[0])
     name = str(signed(track.get(1, [0])[0]))

@@ -20,7 +20,7 @@ from scenicq.importers.lane_graph import BoundedLane, Points, lane_features, len
 from scenicq.importers.lane_parts import Beside, cut_lanes
 from scenicq.importers.protobuf import Message, Value, integers, parse, signed
 from scenicq.importers.report import Report
-from scenicq.importers.specification import specification
+from scenicq.importers.specification import load_specification
 
 __all__ = ["LANE_WIDTH_M", "scenario_features"]
 
@@ -147,7 +147,7 @@ def _message(value: Value, report: Report, at: str) -> Message:
     if not isinstance(value, memoryview):
         raise InvalidError("a field is not a message")
     message = parse(value)
-    specification("waymo").count_message(message, report, at)
+    load_specification("waymo").count_message(message, report, at)
     return message
 
 

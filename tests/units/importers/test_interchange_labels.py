@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from label_rows import labels_of
 
 from scenicq.geometry.angles import normalize
-from scenicq.importers.base import ClassNames, Labels
+from scenicq.importers.base import ClassNames, LabelChecker
 from scenicq.importers.interchange_labels import LabelLines
 from scenicq.importers.report import Report
 from scenicq.store.columns import RecordingColumns
@@ -79,7 +79,7 @@ def read(lines: list[bytes], angle: str = "heading") -> tuple[RecordingColumns |
     taken = LabelLines("r", ClassNames(CLASSES, report), angle, report)
     for number, line in enumerate(lines, start=1):
         taken.add(line, f"labels.jsonl:{number}")
-    found = Labels({"town", "x", "ego"}, report).sound(taken.columns(), taken.places, taken.maps)
+    found = LabelChecker({"town", "x", "ego"}, report).check_columns(taken.columns(), taken.places, taken.maps)
     return pickle.loads(pickle.dumps(found)), report
 
 

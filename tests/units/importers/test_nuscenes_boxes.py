@@ -15,7 +15,7 @@ from label_rows import labels_of
 from msgspec import DecodeError
 
 from scenicq.geometry.angles import normalize
-from scenicq.importers.base import Options
+from scenicq.importers.base import ImportOptions
 from scenicq.importers.fields import InvalidError
 from scenicq.importers.nuscenes import NuScenes
 from scenicq.importers.nuscenes_boxes import BoxReader
@@ -240,7 +240,7 @@ def tiny(folder: Path, table: str, change: Any) -> tuple[list[RecordingColumns],
             change(rows)
         (folder / file.name).write_text(json.dumps(rows, indent=0))
     report = Report()
-    return list(NuScenes().read(folder, Options(), report).recordings(report)), report
+    return list(NuScenes().read(folder, ImportOptions(), report).recordings(report)), report
 
 
 def test_a_bad_row_among_good_ones_is_named(tmp_path: Path) -> None:

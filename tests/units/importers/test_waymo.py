@@ -13,7 +13,7 @@ import pytest
 
 from scenicq.errors import DataError
 from scenicq.geometry.network import Network
-from scenicq.importers.base import Options
+from scenicq.importers.base import ImportOptions
 from scenicq.importers.fields import InvalidError
 from scenicq.importers.ingest import ingest
 from scenicq.importers.lane_parts import Beside, cut_lanes
@@ -70,7 +70,7 @@ def test_what_is_no_message(content: bytes) -> None:
 
 
 def test_lanes_have_a_nominal_width_and_a_direction() -> None:
-    source = Waymo().read(SAMPLE, Options(), Report())
+    source = Waymo().read(SAMPLE, ImportOptions(), Report())
     network = Network(FIRST, source.maps[FIRST])
     assert network.roadDirection.values(30, -1.75) == pytest.approx((-math.pi / 2,))
     assert network.lanes[0].polygon.area == pytest.approx(60 * 3.5)
