@@ -22,7 +22,7 @@ from scenicq.lint.impossible import impossible_requirements
 from scenicq.lint.program import LINTED_MAPS, lint
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.constraints import build_groups, describe_constraint
-from scenicq.match.problem.preprocess import ready
+from scenicq.match.problem.preprocess import prepare_scenario
 from scenicq.option_values import read_values
 from scenicq.query.execution.compiled_map import about_dataset, is_about_map, program_network, read_network
 from scenicq.query.execution.never_compared import coverage
@@ -103,7 +103,7 @@ Details = list[Callable[[Scenario], list[str]]]
 
 def _groups(scenario: Scenario) -> list[str]:
     """The groups of jointly dependent constraints in dependency order, all positions and headings observed."""
-    scenario, seen = ready(scenario), frozenset({"position", "heading"})
+    scenario, seen = prepare_scenario(scenario), frozenset({"position", "heading"})
     signature = (*(seen for _ in scenario.objects), frozenset[str](scenario.params))
     groups = build_groups(scenario, signature, MatchOptions())
     return [
@@ -219,7 +219,7 @@ def _found(
         rest += [replace(each, severity="warning") for each in lacking]
         remarks = lint(source, compiled[:LINTED_MAPS], asked.options, properties=asked.dataset is None)
         if asked.dataset is not None:
-            scenarios = [ready(scenario) for scenario, _ in compiled]
+            scenarios = [prepare_scenario(scenario) for scenario, _ in compiled]
             remarks = [*coverage(asked.dataset, scenarios, asked.options).warnings, *remarks]
         never = {each.span for each in errors}
         remarks = [each for each in remarks if each.span not in never]

@@ -13,7 +13,7 @@ from typing import BinaryIO, Unpack
 
 import click
 
-from scenicq.errors import DataError, Diagnostic, plain_json
+from scenicq.errors import DataError, Diagnostic, printable_json
 from scenicq.evaluate.evaluation import Evaluation, ModelsEvaluation, Results, name_models
 from scenicq.evaluate.evaluation import evaluate_models as judge
 from scenicq.evaluate.evaluation_options import EVALUATION_OPTIONS, EvaluationTexts
@@ -138,7 +138,7 @@ def _write(found: ModelsEvaluation, form: str, sink: BinaryIO) -> None:
         case "json":
             record = models_record(found) if found.only is None else evaluation_record(found.only)
             content = json.dumps(record, ensure_ascii=False, indent=1, allow_nan=False)
-            text = plain_json(content) + "\n"
+            text = printable_json(content) + "\n"
         case "csv" | "spreadsheet":
             lines = io.StringIO(newline="")
             rows = CsvRows(lines, COLUMNS, spreadsheet=form == "spreadsheet")

@@ -9,7 +9,7 @@ from contextlib import closing
 
 import click
 
-from scenicq.errors import plain_json
+from scenicq.errors import printable_json
 from scenicq.store.dataset import Dataset
 from scenicq.store.manifest import Counts, Manifest
 from scenicq.store.map_fit import MapFit, map_fits, misfits
@@ -221,7 +221,7 @@ def info(dataset: str, *, verify: bool, named: bool, format_: str) -> None:
             check_dataset(opened)
             verify_computed(opened)
     if format_ == "json":
-        say(plain_json(opened.manifest.to_json()), nl=False)
+        say(printable_json(opened.manifest.to_json()), nl=False)
     else:
         with opened.blamed():
             fits = map_fits(opened)

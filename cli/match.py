@@ -18,7 +18,7 @@ from scenicq.errors import Diagnostic
 from scenicq.exporters.forms import FORMS
 from scenicq.match.verdict import Match, Unknown
 from scenicq.option_values import Amount, Count
-from scenicq.query.execution.executors import Executor, in_order, on_this_machine, resumed, usual_pieces
+from scenicq.query.execution.executors import Executor, local_executor, ordered_results, resumable, usual_pieces
 from scenicq.query.execution.option_texts import QUERY_OPTIONS
 from scenicq.query.execution.result_summary import ResultSummary
 from scenicq.query.execution.results import Result, Sample
@@ -187,9 +187,12 @@ def match(ctx: click.Context, scenario: str | None, dataset: str | None, *, prog
     if resume and file is not None:
         real = Path(os.path.realpath(file)) if isinstance(file, Path) else file
         pieces = real.with_name(f".{real.name}.pieces")
-        engine = resumed(pieces, engine or on_this_machine(query))
+        engine = resumable(pieces, engine or local_executor(query))
     bar = ProgressBar(query.dataset.manifest.total.frames, quiet=quiet)
-    results = in_order(query, engine, usual_pieces(query, 16), bar.advance) if engine else query.results(bar.advance)
+    if engine is None:
+        results = query.results(bar.advance)
+    else:
+        results = ordered_results(query, engine, usual_pieces(query, 16), bar.advance)
     wanted = Wanted(file, chosen, export, report, pieces, sensors, ranked=rank)
 
     def drawn(found: Generator[Result]) -> Generator[Result]:

@@ -8,7 +8,7 @@ import click
 
 from scenicq.compiler.element_lookups import LaneRule
 from scenicq.compiler.program import compile_scenario
-from scenicq.errors import plain_json
+from scenicq.errors import printable_json
 from scenicq.exporters.sample import PATIENCE_S, sample_labels, sample_record, write_sample
 from scenicq.option_values import SEED, Count, read_values
 from scenicq.query.execution.option_texts import QUERY_OPTIONS, read_built_ins
@@ -86,4 +86,4 @@ def sample(ctx: click.Context, scenario: str | None, dataset: str | None, *, pro
         write_sample(labels, network, Path(source.name.strip("<>")).stem, output)
         return
     for label in labels:
-        say(plain_json(sample_record(label)))
+        say(printable_json(sample_record(label)))

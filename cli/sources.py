@@ -26,7 +26,7 @@ from .user_folders import state_folder
 if TYPE_CHECKING:  # an ingest needs no DuckDB, which comes with this
     from scenicq.store.dataset import Dataset
 
-__all__ = ["SENSORS", "is_noted_sound", "note_sound", "recorded", "remember", "sensor_root"]
+__all__ = ["SENSORS", "is_noted_sound", "note_sound", "recorded_source", "remember", "sensor_root"]
 
 SENSORS = click.option(
     "--sensors",
@@ -79,7 +79,7 @@ def _sound() -> SoundNotes:
     return SoundNotes(state_folder() / "sound")
 
 
-def recorded(dataset: Dataset) -> Path | None:
+def recorded_source(dataset: Dataset) -> Path | None:
     """The source that this user made a dataset from, wherever the dataset is now; None if somebody else made it."""
     digest = _digest(dataset.place.manifest())
     found = None
@@ -97,7 +97,7 @@ def sensor_root(dataset: Dataset, given: Path | None) -> Path | None:
         dataset: The dataset, in whose own folder they may always lie.
         given: What the user gives.
     """
-    root = given or recorded(dataset)
+    root = given or recorded_source(dataset)
     if root is None and any(part.rows for part in dataset.manifest.tables["sensors"]):
         message = f"sensor files are looked for in {dataset.name} alone: it was not made here, or not by you"
         hint = "`--sensors DIR` gives the folder that their paths start from"

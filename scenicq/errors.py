@@ -26,8 +26,8 @@ __all__ = [
     "SolverError",
     "Source",
     "Span",
-    "plain",
-    "plain_json",
+    "printable",
+    "printable_json",
     "render",
     "similar",
 ]
@@ -142,12 +142,12 @@ CONTROL = re.compile(
 """What moves a terminal's cursor, changes its colours or turns text round, except a new line."""
 
 
-def plain(text: str) -> str:
+def printable(text: str) -> str:
     """A text of somebody else's as it is safe on a terminal: control characters are shown, not obeyed."""
     return CONTROL.sub(lambda found: found[0].encode("unicode_escape").decode(), text)
 
 
-def plain_json(text: str) -> str:
+def printable_json(text: str) -> str:
     """JSON as it is safe on a terminal; what it says is the same."""
     return CONTROL.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
 

@@ -15,7 +15,7 @@ from typing import Any, cast
 
 from scenicq.budget import Exhausted
 
-__all__ = ["LIMITS", "Beyond", "Limit", "Limits", "exhausted", "limits"]
+__all__ = ["LIMITS", "Beyond", "Limit", "Limits", "limit_exceeded", "limits"]
 
 
 class Beyond(Enum):
@@ -403,7 +403,7 @@ def limits() -> Iterator[Limit]:
         yield Limit(each.name, value, told["unit"], told["guards"], told["beyond"], told["more"])
 
 
-def exhausted(name: str) -> Exhausted:
+def limit_exceeded(name: str) -> Exhausted:
     """What ends a search at a limit that leaves it undecided: the reason, and in words which limit it was."""
     told = Limits.__dataclass_fields__[name].metadata
     return Exhausted(told["more"], f"more than {getattr(LIMITS, name):,} {told['unit']} {told['guards']}")

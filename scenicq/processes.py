@@ -36,8 +36,8 @@ __all__ = [
     "discard_output",
     "end_group",
     "ended_after",
+    "kill_on_exit",
     "lead_output_away",
-    "leashed",
     "limit_memory",
     "processors",
 ]
@@ -384,7 +384,7 @@ def end_group(process: subprocess.Popen[bytes]) -> None:
 
 
 @contextlib.contextmanager
-def leashed(words: Sequence[str]) -> Generator[tuple[Sequence[str], tuple[int, ...]]]:
+def kill_on_exit(words: Sequence[str]) -> Generator[tuple[Sequence[str], tuple[int, ...]]]:
     """Have a command be killed with its process group when the block or this process ends, however it ends.
 
     Args:

@@ -26,7 +26,7 @@ from scenicq.forest.walk import children
 from scenicq.geometry.regions import DifferenceOf, IntersectionOf, PolygonSet, PolylineSet, UnionOf
 from scenicq.geometry.road_direction import RoadDirection
 
-__all__ = ["absent_parts", "check_directions", "check_enforced", "listed"]
+__all__ = ["absent_parts", "check_directions", "check_enforced", "list_names"]
 
 
 def absent_parts(area: Node) -> tuple[str, ...] | None:
@@ -132,14 +132,14 @@ def check_enforced(scenario: Scenario, enforced: Collection[BuiltIn]) -> None:
         if names is not None:
             owner = scenario.objects[requirement.objects[0]]
             raise fail(
-                "map-lacks", f"the map `{scenario.map}` has nothing for {listed(names)}", owner.span,
+                "map-lacks", f"the map `{scenario.map}` has nothing for {list_names(names)}", owner.span,
                 f"`--enforce {kind.value}` wants `{owner.name}` inside",
                 ("without it nothing is asked of the map",),
                 (Note(requirement.span, "the default"),) if requirement.span not in (None, owner.span) else (),
             )  # fmt: skip
 
 
-def listed(names: Iterable[str]) -> str:
+def list_names(names: Iterable[str]) -> str:
     """Names of parts of a map, as messages give them."""
     return " and ".join(f"`{name}`" for name in names) or "this"
 

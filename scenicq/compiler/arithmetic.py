@@ -15,7 +15,7 @@ from scenicq.errors import ScenarioError, Span
 from scenicq.forest.nodes import Constant
 from scenicq.limits import LIMITS
 
-__all__ = ["check_weight", "hashed", "is_flat", "is_random", "no_number", "plain_binary", "plain_unary"]
+__all__ = ["check_hashable", "check_weight", "is_flat", "is_random", "no_number", "plain_binary", "plain_unary"]
 
 
 _PYTHON: dict[str, Callable[[Any, Any], Any]] = {
@@ -152,7 +152,7 @@ def plain_unary(op: str, value: ModelValue, span: Span) -> ModelValue:
         raise fail("wrong-type", f"`{op}` does not apply to {describe(value)}", span) from None
 
 
-def hashed(value: ModelValue, span: Span) -> ModelValue:
+def check_hashable(value: ModelValue, span: Span) -> ModelValue:
     """A value that is to be a key or the member of a set.
 
     Raises:

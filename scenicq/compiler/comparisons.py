@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import cast
 
 from scenicq.compiler import operators
-from scenicq.compiler.arithmetic import check_weight, hashed, is_flat, is_random, plain_binary
+from scenicq.compiler.arithmetic import check_hashable, check_weight, is_flat, is_random, plain_binary
 from scenicq.compiler.coerce import kind_of_model
 from scenicq.compiler.other_objects import is_element, is_nearest, same_object
 from scenicq.compiler.random_values import holds_instances, is_choice, lift, possible_values
@@ -194,7 +194,7 @@ def _membership(op: str, left: ModelValue, right: ModelValue, span: Span) -> Mod
         if _is_special(left) or (not is_flat(items) and any(map(_is_special, items))):
             return negated(_any_equal(left, items, span))
         check_weight(span, left, right, compared=True)
-        return (hashed(left, span) in right if isinstance(right, dict | set) else left in items) == (op == "in")
+        return (check_hashable(left, span) in right if isinstance(right, dict | set) else left in items) == (op == "in")
     raise fail("wrong-type", f"`{op}` needs a region or a list", span, f"this is {describe(right)}",
                _at_a_side(span))  # fmt: skip
 

@@ -25,7 +25,7 @@ from scenicq.limits import LIMITS
 if TYPE_CHECKING:
     from scenicq.compiler.interpreter import Interpreter
 
-__all__ = ["Course", "as_test", "option_of", "split", "without_courses"]
+__all__ = ["Course", "as_test", "option_of", "split_by_course", "without_courses"]
 
 
 class Course:
@@ -93,7 +93,7 @@ def without_courses(run: Interpreter) -> AbstractContextManager[None]:
     return _on(run, Course())
 
 
-def split(run: Interpreter, evaluate: Callable[[], Node], span: Span) -> Node:
+def split_by_course(run: Interpreter, evaluate: Callable[[], Node], span: Span) -> Node:
     """The value of a condition as a choice between those of its courses.
 
     Args:

@@ -19,7 +19,7 @@ from scenicq.compiler.assignment import assign
 from scenicq.compiler.coerce import read_over_time, to_boolean
 from scenicq.compiler.contracts import Contract, action_contract, behavior_contract
 from scenicq.compiler.coroutines import CoroutineCall, LibraryCall, MonitorDefinition, ScenarioDefinition, as_behavior
-from scenicq.compiler.courses import split, without_courses
+from scenicq.compiler.courses import split_by_course, without_courses
 from scenicq.compiler.environment import Environment
 from scenicq.compiler.exclusions import with_exclusions
 from scenicq.compiler.items import items_of
@@ -262,7 +262,7 @@ class ProcessGraph:
 
         key = wanted, state.frames[number], state.begun
         if key not in self._asked:
-            self._asked[key] = self.excluding(lambda: split(run, evaluated, wanted.span))
+            self._asked[key] = self.excluding(lambda: split_by_course(run, evaluated, wanted.span))
         node, guards = self._asked[key]
         return self.test(state, node, guards, then, otherwise, wanted.span)
 

@@ -12,7 +12,7 @@ from typing import TypeVar, cast
 
 from scenicq.budget import Exhausted, limited
 from scenicq.compiler import operators
-from scenicq.compiler.absent import check_directions, listed
+from scenicq.compiler.absent import check_directions, list_names
 from scenicq.compiler.arithmetic import no_number
 from scenicq.compiler.coerce import PARTIAL, to_node, to_region, to_scalar, to_vector
 from scenicq.compiler.composition_graph import ComposedScenario
@@ -180,7 +180,7 @@ def _anywhere(objects: list[Instance]) -> tuple[Diagnostic, ...]:
     freed = [each for each in objects if _is_anywhere(each)]
     if not freed:
         return ()
-    named = listed(dict.fromkeys(each.cls.name for each in freed))
+    named = list_names(dict.fromkeys(each.cls.name for each in freed))
     message = f"there is no map: {named} may be anywhere and head anywhere, where the program says nothing else"
     return (Diagnostic("no-map", message, freed[0].span, severity="note"),)
 

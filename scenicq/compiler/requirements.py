@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from scenicq.compiler import expressions
 from scenicq.compiler.coerce import to_boolean
-from scenicq.compiler.courses import split
+from scenicq.compiler.courses import split_by_course
 from scenicq.compiler.environment import Environment
 from scenicq.compiler.logic import condition
 from scenicq.compiler.temporal import is_temporal
@@ -65,7 +65,7 @@ def defer(run: Interpreter, wanted: ast.Expression, scope: Environment, span: Sp
                        ("write `F at V`",))  # fmt: skip
         return to_boolean(value, wanted.span)
 
-    return lambda: split(run, truth, wanted.span)
+    return lambda: split_by_course(run, truth, wanted.span)
 
 
 def defer_value(

@@ -16,7 +16,7 @@ from scenicq.compiler.items import components, is_vector, items_of
 from scenicq.compiler.known_properties import as_constant, known_truth
 from scenicq.compiler.other_objects import how_many, truth_of_list
 from scenicq.compiler.random_values import each_existing, is_choice
-from scenicq.compiler.rounding import in_order
+from scenicq.compiler.rounding import sort_numbers
 from scenicq.compiler.values import Builtin, Choice, Function, LabelObjects, ModelValue, OtherList, fail
 from scenicq.errors import Span
 from scenicq.forest.nodes import Constant
@@ -60,7 +60,7 @@ def sequence_functions(run: Interpreter) -> dict[str, ModelValue]:
         random, backwards = any(is_random(value) for value, _ in keyed), truth(reverse, span)
         if random and key is None and all(kind_of_model(item) == "scalar" for _, item in keyed):
             run.budget.step(span, len(keyed) ** 2)
-            numbers = in_order([to_scalar(item, span) for _, item in keyed], span)
+            numbers = sort_numbers([to_scalar(item, span) for _, item in keyed], span)
             return numbers[::-1] if backwards else numbers
         if random and run.course is None:
             raise fail("random-branch", "random values have no known order", span, "random here",

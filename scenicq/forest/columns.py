@@ -34,7 +34,7 @@ __all__ = [
     "common_status",
     "constant_column",
     "distances",
-    "packed",
+    "pack_values",
     "truth_of",
     "value_reader",
 ]  # fmt: skip
@@ -123,7 +123,7 @@ class ColumnPlaces:
 def column_of(values: Sequence[Value]) -> Column:
     """Values one after the other; None is unknown."""
     said = [UNKNOWN if value is None else UNDEFINED if isinstance(value, Undefined) else DEFINED for value in values]
-    return Column(packed(values, said, np.arange(len(values))), np.array(said, dtype=np.int8))
+    return Column(pack_values(values, said, np.arange(len(values))), np.array(said, dtype=np.int8))
 
 
 def constant_column(value: Value) -> Column:
@@ -197,7 +197,7 @@ def value_reader(data: Data, shape: tuple[int, ...]) -> Callable[[int], Value]:
     return lambda place: kind(arrays[0][place])
 
 
-def packed(values: Sequence[Value], said: Sequence[np.int8], code: NDArray[np.intp]) -> Data:
+def pack_values(values: Sequence[Value], said: Sequence[np.int8], code: NDArray[np.intp]) -> Data:
     """Values by their numbers: as arrays, if those that are defined are all numbers, truth values or vectors."""
     there = [value for value, status in zip(values, said, strict=True) if status == DEFINED]
     if not there:

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from scenicq.errors import CannotEvaluate, Span
 from scenicq.forest import build
 from scenicq.forest.angle_wrap import one_turn
-from scenicq.forest.collisions import apart, boxes
+from scenicq.forest.collisions import boxes, no_overlap
 from scenicq.forest.compute import fold
 from scenicq.forest.condition import condition
 from scenicq.forest.nodes import (
@@ -113,7 +113,7 @@ def _requirements(scenario: Scenario, enforce: Set[BuiltIn]) -> Iterator[Require
     if BuiltIn.COLLISION in enforce:
         frames = boxes(scenario)
         for first, second in itertools.combinations(scenario.solid, 2):
-            yield apart(scenario, frames, first, second)
+            yield no_overlap(scenario, frames, first, second)
 
 
 def _requirement_text(scenario: Scenario, requirement: Requirement) -> str:

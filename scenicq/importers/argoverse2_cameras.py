@@ -10,7 +10,7 @@ from typing import Any
 
 from scenicq.errors import DataError
 from scenicq.geometry.camera import Camera
-from scenicq.importers.cameras import Mount, Pose, pose_of, posed
+from scenicq.importers.cameras import Mount, Pose, place_camera, pose_of
 from scenicq.importers.columnar import read_feather
 from scenicq.importers.fields import InvalidError
 from scenicq.importers.folders import readable
@@ -58,7 +58,7 @@ def views_of(log: Path, times: Sequence[int], images: Images, report: Report) ->
         mount, size = mounts[name]
         if taken in vehicles:
             try:
-                views[time][readable(name)] = posed(mount, vehicles[taken], *size)
+                views[time][readable(name)] = place_camera(mount, vehicles[taken], *size)
             except InvalidError as error:
                 tell(f"calibration: `{name}` at {taken}: {error}")
     return views

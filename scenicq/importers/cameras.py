@@ -12,7 +12,7 @@ from scenicq.importers.fields import InvalidError, Record
 from scenicq.importers.motion import Quaternion, pose_of_quaternion, unit_quaternion
 from scenicq.store.camera_rows import camera_problem
 
-__all__ = ["CAMERA_KEYS", "Mount", "Pose", "camera_of", "pose_of", "posed", "sound_camera"]
+__all__ = ["CAMERA_KEYS", "Mount", "Pose", "camera_of", "place_camera", "pose_of", "sound_camera"]
 
 Pose = tuple[Quaternion, tuple[float, float, float]]
 """A unit quaternion w, x, y, z and an origin in metres."""
@@ -45,7 +45,7 @@ def pose_of(rotation: tuple[float, ...], origin: tuple[float, ...]) -> Pose:
     return unit_quaternion(w, x, y, z), (a, b, c)
 
 
-def posed(mount: Mount, vehicle: Pose, width: int, height: int) -> Camera:
+def place_camera(mount: Mount, vehicle: Pose, width: int, height: int) -> Camera:
     """The camera of a vehicle.
 
     Args:

@@ -16,7 +16,7 @@ from scenicq.importers.fields import InvalidError, whole
 from scenicq.importers.nuscenes_rows import Annotation
 from scenicq.store.columns import pick_rows, to_json
 
-__all__ = ["BoxReader", "Boxes", "headings", "is_unit", "joined", "norms_of", "vectors"]
+__all__ = ["BoxReader", "Boxes", "headings", "is_unit", "join_boxes", "norms_of", "vectors"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,7 +41,7 @@ class Boxes:
         return Boxes(**{each.name: pick_rows(getattr(self, each.name), order) for each in fields(self)})
 
 
-def joined(parts: Sequence[Boxes]) -> Boxes:
+def join_boxes(parts: Sequence[Boxes]) -> Boxes:
     """One after the other."""
     nothing = np.zeros(0, dtype=np.int64)
     parts = [Boxes((), nothing, nothing, np.zeros((0, 7)), ()), *parts]

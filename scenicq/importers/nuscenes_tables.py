@@ -17,11 +17,11 @@ import numpy as np
 from scenicq.geometry.camera import Camera
 from scenicq.importers import fields
 from scenicq.importers import nuscenes_rows as tables
-from scenicq.importers.cameras import Mount, Pose, posed
+from scenicq.importers.cameras import Mount, Pose, place_camera
 from scenicq.importers.cameras import pose_of as vehicle_pose
 from scenicq.importers.fields import InvalidError, whole
 from scenicq.importers.json_tables import ElementBlock, read_list
-from scenicq.importers.nuscenes_boxes import Boxes, BoxReader, headings, joined, norms_of, vectors
+from scenicq.importers.nuscenes_boxes import Boxes, BoxReader, headings, join_boxes, norms_of, vectors
 from scenicq.importers.nuscenes_scenes import POSE_CHANNEL, Instant, SceneContent
 from scenicq.importers.recording_checks import tell_order
 from scenicq.importers.report import Report
@@ -226,7 +226,7 @@ class Tables:
     def _add_camera(self, image: _Image, vehicle: Pose) -> None:
         channel, mount = image.sensor.channel, image.sensor.mount
         if mount is not None:
-            camera = posed(mount, vehicle, image.width, image.height)
+            camera = place_camera(mount, vehicle, image.width, image.height)
             self.sensors[image.sample][channel] = self.sensors[image.sample][channel][0], camera
 
     def _read_boxes(self) -> None:
@@ -238,7 +238,7 @@ class Tables:
         track_numbers = {token: number for number, token in enumerate(sorted(self._classes))}
         reader = BoxReader(sample_numbers, track_numbers, attributes, visible)
         path = self._folder / "sample_annotation.json"
-        self._boxes = joined(
+        self._boxes = join_boxes(
             [self._boxes_in(reader, path.name, block) for block in read_list(path, tables.ANNOTATIONS.many)]
         )
         self._tracks: list[tuple[str, str]] = [(token, self._classes[token]) for token in track_numbers]

@@ -19,7 +19,7 @@ from scenicq.importers.by_file import RecordingFiles, by_file_source, map_sink, 
 from scenicq.importers.fields import InvalidError
 from scenicq.importers.layouts import waymo_files
 from scenicq.importers.motion import heading_of_yaw
-from scenicq.importers.protobuf import Message, parse, signed
+from scenicq.importers.protobuf import Message, parse, to_signed
 from scenicq.importers.recording_checks import radians
 from scenicq.importers.report import Report
 from scenicq.importers.specification import load_specification
@@ -122,7 +122,7 @@ def _read_scenario(place: RecordingFiles, classes: ClassNames, report: Report) -
     try:
         scenario = parse(read_record(place.files[0], int(place.options[0])))
         times = [_real(value) for value in scenario.get(_TIMESTAMPS, [])]
-        ego_index = signed(scenario.get(_EGO, [-1])[0])
+        ego_index = to_signed(scenario.get(_EGO, [-1])[0])
         tracks = scenario.get(_TRACKS, [])
         if not 0 <= ego_index < len(tracks):
             raise InvalidError("`sdc_track_index` names no track")
@@ -154,8 +154,8 @@ def _read_scenario(place: RecordingFiles, classes: ClassNames, report: Report) -
 def _track(track: Message, is_ego: bool, classes: ClassNames, report: Report, where: str) -> dict[int, LabelObject]:
     known = load_specification("waymo")
     known.count_message(track, report, _AT_TRACK)
-    kind = signed(track.get(2, [0])[0])
-    name = str(signed(track.get(1, [0])[0]))
+    kind = to_signed(track.get(2, [0])[0])
+    name = str(to_signed(track.get(1, [0])[0]))
     source_class = _KINDS.get(kind, "unset")
     found: dict[int, LabelObject] = {}
     for step, value in enumerate(track.get(3, [])):

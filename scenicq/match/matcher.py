@@ -26,7 +26,7 @@ from scenicq.match.problem.candidates import Candidates, possible_egos, prepare_
 from scenicq.match.problem.conditioned import Item
 from scenicq.match.problem.map_lookups import MapLookups
 from scenicq.match.problem.outcome import Outcome, Undecided
-from scenicq.match.problem.preprocess import ready
+from scenicq.match.problem.preprocess import prepare_scenario
 from scenicq.match.search.backtracking import Reporter
 from scenicq.match.search.batch_lookups import look_up_positions
 from scenicq.match.search.label_search import LabelSearch
@@ -64,7 +64,7 @@ class Matcher:
 
     def __post_init__(self, known: PlanCache | None) -> None:
         """Rewrite the scenario and tie the tolerance to its objects."""
-        self.scenario = ready(self.scenario)
+        self.scenario = prepare_scenario(self.scenario)
         self.options = replace(self.options, tolerance=self.options.tolerance.for_scenario(self.scenario))
         self.plans = known or PlanCache(self.scenario, self.options)
         self._verdicts = VerdictBuilder(self.scenario, self.options)

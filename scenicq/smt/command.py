@@ -17,7 +17,7 @@ from typing import IO, Self
 
 from scenicq.errors import Diagnostic, SolverError
 from scenicq.limits import LIMITS
-from scenicq.processes import end_group, ended_after, leashed, limit_memory
+from scenicq.processes import end_group, ended_after, kill_on_exit, limit_memory
 from scenicq.refusals import refused_by_system
 from scenicq.smt.answer import Answer, NoAnswer, Sat
 from scenicq.smt.problem import Problem, holds
@@ -57,7 +57,7 @@ class SmtlibSolver:
 
     def check(self, problem: Problem, *, precision: float, timeout_s: float) -> Answer:
         """Decide a problem in a new process; see `Solver.check`."""
-        with leashed(self._words) as (words, leash), self._spawn(words, leash) as process:
+        with kill_on_exit(self._words) as (words, leash), self._spawn(words, leash) as process:
             text, expired = _converse(process, to_smtlib(problem, precision).encode(), timeout_s)
         if len(text) > LIMITS.command_reply_bytes:
             return NoAnswer("garbage")

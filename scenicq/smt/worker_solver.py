@@ -19,7 +19,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import IO, Self
 
-from scenicq.budget import leave_out, uncounted
+from scenicq.budget import leave_out, stop_clock
 from scenicq.errors import Diagnostic, SolverError
 from scenicq.limits import LIMITS
 from scenicq.processes import end_group, ended_after
@@ -83,7 +83,7 @@ class WorkerSolver:
             self.close()
         greeting: dict[str, str] = {}
         for _ in range(LIMITS.worker_starts):
-            with uncounted():
+            with stop_clock():
                 greeting = self._spawn()
             if "ready" in greeting:
                 self._version, self._has_loaded = greeting["ready"], True

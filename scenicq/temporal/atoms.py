@@ -43,7 +43,7 @@ from scenicq.forest.temporal import Atom
 from scenicq.forest.unobserved import certain_and_possible, is_only_observed
 from scenicq.forest.walk import children, is_leaf, leaves, postorder
 from scenicq.limits import LIMITS
-from scenicq.temporal.grouping import alike
+from scenicq.temporal.grouping import group_equal
 from scenicq.temporal.samples import FIXED, BoundSamples, Observed, is_moving
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
@@ -273,7 +273,7 @@ class AtomColumns:
             observed &= column.status == DEFINED
             for part in arrays_of(column.data):
                 _, codes = np.unique(part, return_inverse=True)
-                _, found = alike(found * (int(codes.max(initial=0)) + 1) + codes)
+                _, found = group_equal(found * (int(codes.max(initial=0)) + 1) + codes)
         return np.where(observed, found, -1)
 
     def _definition(self, feature: Feature) -> Node | None:

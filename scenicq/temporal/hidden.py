@@ -39,7 +39,7 @@ from scenicq.forest.nodes import (
 from scenicq.forest.walk import children, leaves, postorder, transform
 from scenicq.temporal.atoms import AtomColumns, UnclearVariable
 
-__all__ = ["affine_sides", "comparisons_of", "has_cuts", "inside", "possibly", "random_variables", "support"]
+__all__ = ["affine_sides", "comparisons_of", "has_cuts", "possibly", "random_variables", "support", "value_between"]
 
 
 def random_variables(conditions: Iterable[Node]) -> list[Leaf]:
@@ -179,7 +179,7 @@ def affine_sides(
     return sides[0], sides[1] - sides[0], unknown
 
 
-def inside(low: float, high: float) -> float:
+def value_between(low: float, high: float) -> float:
     """A value between two, of which one or both may be infinite."""
     if math.isinf(low) and math.isinf(high):
         return 0.0

@@ -19,7 +19,7 @@ from scenicq.limits import LIMITS
 from scenicq.match.options import MatchOptions
 from scenicq.match.verdict import Match, Unknown, WitnessValue
 from scenicq.temporal.atoms import AtomColumns, UnclearVariable
-from scenicq.temporal.hidden import inside
+from scenicq.temporal.hidden import value_between
 from scenicq.temporal.hidden_bounds import PossibleValues
 from scenicq.temporal.hidden_conditions import HiddenConditions
 from scenicq.temporal.hidden_examples import Example, Examples, InitialScene, Remembered
@@ -287,7 +287,7 @@ def _one_each(matches: Sequence[Runs]) -> list[Runs]:
 def _values(hidden: HiddenConditions, pieces: Runs, number: int) -> dict[Identity, Value]:
     """A value of each hidden number in a piece."""
     ends = zip(pieces.low[number].tolist(), pieces.high[number].tolist(), strict=True)
-    return {leaf.identity: inside(*each) for leaf, each in zip(hidden.variables, ends, strict=True)}
+    return {leaf.identity: value_between(*each) for leaf, each in zip(hidden.variables, ends, strict=True)}
 
 
 @dataclass(frozen=True, eq=False, slots=True)

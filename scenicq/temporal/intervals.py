@@ -40,7 +40,7 @@ from scenicq.temporal.run_lanes import follow_runs
 from scenicq.temporal.run_machine import RunMachine
 from scenicq.temporal.runs import Detail, Runs
 from scenicq.temporal.samples import is_moving
-from scenicq.temporal.selection import chosen
+from scenicq.temporal.selection import choose_intervals
 from scenicq.temporal.stretches import StartTable, Stretches, stretches_of
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
@@ -269,7 +269,7 @@ class IntervalMatcher:
             surest = _surest(first, last, truth[several])
             several, first, last = several[surest], first[surest], last[surest]
         look()
-        kept = several[chosen(first, last, truth[several], lasting[several], self.options.intervals, least)]
+        kept = several[choose_intervals(first, last, truth[several], lasting[several], self.options.intervals, least)]
         told = self._verdicts(found.some(np.concatenate((alone, kept))), table, order)
         # what was cut off might have matched; else what was matched but is too short, else what came furthest
         open_ = np.flatnonzero(many[own] == 0)

@@ -36,7 +36,7 @@ from scenicq.temporal.first_exits import next_at
 from scenicq.temporal.hidden import possibly
 from scenicq.temporal.required import Required
 from scenicq.temporal.samples import MOVING, BoundSamples
-from scenicq.temporal.starts import RoleCandidates, narrowed
+from scenicq.temporal.starts import RoleCandidates, narrow_candidates
 from scenicq.temporal.truth import FALSE, Truth
 
 __all__ = ["NecessaryConditions"]
@@ -117,7 +117,7 @@ class NecessaryConditions:
         place = np.searchsorted(candidates.labels, block.label_of[candidates.members])
         there = [np.bincount(place[mine], minlength=len(candidates.labels)) > 0 for mine in may.values()]
         found = RoleCandidates(candidates.labels, candidates.members, may)
-        return narrowed(found, np.logical_and.reduce(there), place) if there else found
+        return narrow_candidates(found, np.logical_and.reduce(there), place) if there else found
 
     def _truth(self, block: TrackBlock, role: int, members: Members, condition: Node) -> Truth:
         """The value of a condition where an object plays a role."""

@@ -19,7 +19,7 @@ from scenicq.errors import Span
 from scenicq.forest.temporal import Atom
 from scenicq.limits import LIMITS
 from scenicq.temporal.first_exits import FirstExits, next_at
-from scenicq.temporal.grouping import alike, groups
+from scenicq.temporal.grouping import group_equal, groups
 from scenicq.temporal.hidden_conditions import HiddenConditions
 from scenicq.temporal.run_machine import Advance, RunMachine
 from scenicq.temporal.run_notes import Notes
@@ -117,7 +117,7 @@ class RunSteps:
         code = np.zeros(len(stretches), np.int64)
         for truth in truths:
             code = _told_apart(code, truth)
-        firsts, self.code = alike(code)
+        firsts, self.code = group_equal(code)
         told: list[list[int]] = [truth[firsts].tolist() for truth in truths]
         self.rows: list[dict[int, int]] = [
             {number: values[row] for number, values in zip(known, told, strict=True)} for row in range(len(firsts))
@@ -185,7 +185,7 @@ class RunSteps:
         code = self.code
         for each in told.values():
             code = _told_apart(code, each)
-        rows, which = alike(code)
+        rows, which = group_equal(code)
         stays = (Advance(number),)
         held = [
             self.machine.advance(number, self._row(place, told, place), due=False) == stays

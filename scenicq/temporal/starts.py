@@ -26,7 +26,7 @@ from scenicq.match.decide.range_forms import Columns, FloatColumn, Get
 from scenicq.match.matcher import Matcher
 from scenicq.match.problem.constraints import Signature, describe_constraint, relevant_properties
 from scenicq.match.problem.map_lookups import MapLookups
-from scenicq.match.problem.preprocess import ready
+from scenicq.match.problem.preprocess import prepare_scenario
 from scenicq.match.problem.symmetry import classes_of_twins
 from scenicq.match.search.group_plan import MatchPlan
 from scenicq.match.search.plan_cache import PlanCache
@@ -38,7 +38,7 @@ from scenicq.temporal.presence import by_presence, observes
 from scenicq.temporal.samples import WITH_COLUMNS, BoundSamples
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
-__all__ = ["RoleCandidates", "StartSearch", "Starts", "narrowed", "start_matchers"]
+__all__ = ["RoleCandidates", "StartSearch", "Starts", "narrow_candidates", "start_matchers"]
 
 Members = NDArray[np.int64]
 _AT_ONCE = 200_000
@@ -114,7 +114,7 @@ def start_matchers(matcher: Matcher, outcomes: Sequence[Outcome]) -> list[Matche
     def with_outcome(outcome: Outcome) -> Matcher:
         if outcome.same_start:
             return whole
-        scenario = ready(outcome.scenario)
+        scenario = prepare_scenario(outcome.scenario)
         derived = _Derived(scenario, matcher.options, whole=plans)
         return Matcher(scenario, matcher.options, matcher.solver, derived)
 
@@ -206,7 +206,7 @@ class StartSearch:
         starts, decided = self._correspondences(block, candidates, np.flatnonzero(sure & ~out))
         left = ~out
         left[decided] = False
-        return Starts(starts, narrowed(candidates, left, place), sure[left], failed)
+        return Starts(starts, narrow_candidates(candidates, left, place), sure[left], failed)
 
     def plain_truth(self, places: BoundSamples, requirements: Sequence[Requirement]) -> tuple[Truth, NDArray[np.int64]]:
         """Whether all requirements hold at each place, and the number of the first that does not, -1 if none."""
@@ -339,7 +339,7 @@ def _in_order(block: TrackBlock, plan: MatchPlan, members: dict[int, Members], c
     return True
 
 
-def narrowed(candidates: RoleCandidates, kept: NDArray[np.bool_], place: NDArray[np.int64]) -> RoleCandidates:
+def narrow_candidates(candidates: RoleCandidates, kept: NDArray[np.bool_], place: NDArray[np.int64]) -> RoleCandidates:
     """The candidates of some of its labels; `place` is the label of each of its members."""
     mine = kept[place]
     return RoleCandidates(

@@ -18,7 +18,7 @@ from scenicq.geometry.road_direction import RoadDirection
 from scenicq.limits import LIMITS
 from scenicq.match.decide.closed_form import ClosedForm, Evaluated, each_position
 from scenicq.match.decide.compiled_expressions import CompiledExpressions
-from scenicq.match.decide.range_forms import Columns, FloatColumn, Form, Get, Scalar, by_option, clipped, spread
+from scenicq.match.decide.range_forms import Columns, FloatColumn, Form, Get, Scalar, by_option, clip, spread
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.evaluation import unlike
 from scenicq.match.problem.map_lookups import MapLookups
@@ -75,7 +75,7 @@ def number(item: Comparison, known: Mapping[Identity, float]) -> ClosedForm | No
             raise CannotEvaluate("what a closed form does not say")
         for chosen, form in cases:
             known = form.known(get)
-            value = clipped(seen, known + form.low, known + form.high)
+            value = clip(seen, known + form.low, known + form.high)
             off = abs(value - seen)
             holds, misses = off <= margin.sure, off > margin.reach + SLACK
             if many or holds:
@@ -167,7 +167,7 @@ def heading(item: Comparison, known: Mapping[Identity, float]) -> ClosedForm | N
             beyond = abs(off) - half
             holds, misses = beyond <= margin.sure, beyond > margin.reach + SLACK
             if many or holds:
-                values = spread(form, middle + clipped(off, -half, half))
+                values = spread(form, middle + clip(off, -half, half))
                 return Evaluated(holds, misses, chosen | values if chosen else values)
             fails = fails and misses
         return Evaluated(False, fails, {})

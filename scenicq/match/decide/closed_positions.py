@@ -13,7 +13,7 @@ from scenicq.forest.groups import Comparison
 from scenicq.forest.nodes import Identity, PointIn, Rotate, Value, VectorOf, VectorSum
 from scenicq.match.decide.closed_form import FAILS, ClosedForm, Evaluated, each_position
 from scenicq.match.decide.compiled_expressions import CompiledExpressions
-from scenicq.match.decide.range_forms import Columns, CompiledVector, FloatColumn, Get, Scalar, clipped, spread, turned
+from scenicq.match.decide.range_forms import Columns, CompiledVector, FloatColumn, Get, Scalar, clip, cos_sin, spread
 from scenicq.match.decide.region_tests import region_test
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.evaluation import unlike
@@ -155,13 +155,13 @@ def offset(item: Comparison) -> ClosedForm | None:
                 qx, qy = shift(get)
                 px, py = px - qx, py - qy
             elif angle is not None:
-                c, s = turned(angle(get))
+                c, s = cos_sin(angle(get))
                 px, py = px * c + py * s, py * c - px * s
                 turns.append((c, s))
         # hundreds of candidates come here: most offsets have no known part to work out
         a = x.known(get) if x.parts else x.constant
         b = y.known(get) if y.parts else y.constant
-        u, v = clipped(px, a + x.low, a + x.high), clipped(py, b + y.low, b + y.high)
+        u, v = clip(px, a + x.low, a + x.high), clip(py, b + y.low, b + y.high)
         holds, fails = _close(u - px, v - py, margin)
         if margin.kind == "box" and holds is not True and fails is not True:
             middle = a + (x.low + x.high) / 2 - px, b + (y.low + y.high) / 2 - py

@@ -49,7 +49,7 @@ from scenicq.match.decide.range_forms import (
     Form,
     Get,
     Scalar,
-    turned,
+    cos_sin,
 )
 from scenicq.match.linear.affine_reach import ends
 
@@ -300,7 +300,7 @@ def _exact(node: Node, args: list[Exact | None]) -> Exact | None:
             whole, angle = cast(CompiledVector, args[0]), cast(Scalar, args[1])
 
             def rotated(get: Get) -> tuple[float, float]:
-                (a, b), (c, s) = whole(get), turned(angle(get))
+                (a, b), (c, s) = whole(get), cos_sin(angle(get))
                 return (a * c - b * s, a * s + b * c)
 
             return rotated

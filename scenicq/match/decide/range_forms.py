@@ -23,9 +23,9 @@ __all__ = [
     "Get",
     "Scalar",
     "by_option",
-    "clipped",
+    "clip",
+    "cos_sin",
     "spread",
-    "turned",
 ]
 
 Get: TypeAlias = Callable[[int, str], Value]
@@ -81,7 +81,7 @@ def by_option(number: Scalar, get: Get, size: int) -> Iterator[tuple[int, NDArra
         yield option, np.flatnonzero(meant == option)
 
 
-def turned(angle: float) -> tuple[float, float]:
+def cos_sin(angle: float) -> tuple[float, float]:
     """Cosine and sine; of a column, columns."""
     if isinstance(angle, np.ndarray):
         angles: list[float] = angle.tolist()
@@ -89,7 +89,7 @@ def turned(angle: float) -> tuple[float, float]:
     return math.cos(angle), math.sin(angle)
 
 
-def clipped(value: float, low: float, high: float) -> float:
+def clip(value: float, low: float, high: float) -> float:
     """The value, or the end that it is beyond; of columns, a column."""
     if isinstance(value, np.ndarray):
         raised = np.where(np.greater(low, value), low, value)
@@ -170,11 +170,11 @@ def spread(form: Form, value: float) -> dict[Identity, Value]:
         return {}
     if len(form.terms) == 1:
         ((identity, (factor, low, high)),) = form.terms.items()
-        return {identity: clipped(value / factor, low, high)}
+        return {identity: clip(value / factor, low, high)}
     if form.unbounded:
         # the unbounded one takes what the middles of the others leave
         return _with_rest(form, value)
-    share = 0.5 if form.high == form.low else clipped((value - form.low) / (form.high - form.low), 0.0, 1.0)
+    share = 0.5 if form.high == form.low else clip((value - form.low) / (form.high - form.low), 0.0, 1.0)
     return {
         identity: low + share * (high - low) if factor > 0 else high - share * (high - low)
         for identity, (factor, low, high) in form.terms.items()

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from scenicq.forest.among import LabelElements
 from scenicq.forest.nodes import COURSE, Value
 from scenicq.forest.scenario import Scenario
-from scenicq.limits import LIMITS, exhausted
+from scenicq.limits import LIMITS, limit_exceeded
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.bipartite_matching import Slot, matchable
 from scenicq.match.problem.constraints import Signature
@@ -120,7 +120,7 @@ class LabelProblem:
         params = frozenset(self.params)
         for count, chosen in enumerate(itertools.product(*choices)):
             if count >= LIMITS.signatures:
-                raise exhausted("signatures")
+                raise limit_exceeded("signatures")
             signature = (*(names for names, _ in chosen), params)
             yield signature, {index: numbers for index, (_, numbers) in enumerate(chosen)}
 

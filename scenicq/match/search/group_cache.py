@@ -43,7 +43,7 @@ from scenicq.match.search.group_plan import GroupPlan
 if TYPE_CHECKING:  # takes long to load
     from scenicq.match.fields.heading_propagation import DirectedCases, KnownCases
 
-__all__ = ["POSTPONED", "GroupCache", "known_of", "surely", "translated"]
+__all__ = ["POSTPONED", "GroupCache", "known_of", "rename_variables", "surely"]
 
 POSTPONED = "postponed"
 """The reason of what is undecided for want of patience alone."""
@@ -121,7 +121,10 @@ class GroupCache:
         return items
 
     def of(self, plan: GroupPlan, assignment: Mapping[int, int]) -> tuple[Group, Outcome]:
-        """What is decided for the label objects in a group's roles, said of a group of its shape (see `translated`)."""
+        """What is decided for the label objects in a group's roles: the group of its shape, and the outcome for that.
+
+        `rename_variables` makes it the outcome of the group.
+        """
         key = (plan.kind, tuple([assignment[index] for index in plan.roles]))
         known = self._known.get(key)
         if known is None:
@@ -192,7 +195,7 @@ class GroupCache:
         return self.ask(items, found) if isinstance(found, Undecided) else found
 
 
-def translated(decided: tuple[Group, Outcome], target: Group) -> Outcome:
+def rename_variables(decided: tuple[Group, Outcome], target: Group) -> Outcome:
     """What was decided for a group, said of another one of the same shape."""
     source, outcome = decided
     if source is target:

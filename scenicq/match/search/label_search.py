@@ -29,7 +29,7 @@ from scenicq.match.problem.outcome import Outcome, Patience, Refuted, Satisfied,
 from scenicq.match.problem.symmetry import in_one_order
 from scenicq.match.search.arc_consistency import arc_consistent
 from scenicq.match.search.backtracking import Consistency, Reporter, find_assignments
-from scenicq.match.search.group_cache import POSTPONED, GroupCache, known_of, surely, translated
+from scenicq.match.search.group_cache import POSTPONED, GroupCache, known_of, rename_variables, surely
 from scenicq.match.search.group_plan import GroupPlan, MatchPlan
 
 __all__ = ["Failure", "LabelSearch", "Solution"]
@@ -213,7 +213,7 @@ class LabelSearch:
 
     def decide(self, plan: GroupPlan, assignment: Mapping[int, int]) -> Outcome:
         """Decide a group for the label objects in its roles, or remember what was decided for them."""
-        return translated(self._decisions.of(plan, assignment), plan.group)
+        return rename_variables(self._decisions.of(plan, assignment), plan.group)
 
     def _judge(self, plan: GroupPlan, assignment: Mapping[int, int], depth: int) -> Consistency:
         """Decide a group, and remember what failed furthest."""
@@ -225,7 +225,7 @@ class LabelSearch:
             return Consistency.UNKNOWN
         if self.failure is None or depth > self.failure.depth:
             self.failure = Failure(
-                depth, plan.group, cast("Refuted", translated(decided, plan.group)), dict(assignment)
+                depth, plan.group, cast("Refuted", rename_variables(decided, plan.group)), dict(assignment)
             )
         return Consistency.NO
 

@@ -32,7 +32,7 @@ from scenicq.budget import time_left_s
 from scenicq.errors import DataError, Diagnostic
 from scenicq.limits import LIMITS
 from scenicq.processes import processors
-from scenicq.query.execution.executors import Done, Executor, Progress, Question, alone, run_piece
+from scenicq.query.execution.executors import Done, Executor, Progress, Question, run_frame_by_frame, run_piece
 from scenicq.query.execution.pieces import DatasetPiece
 from scenicq.query.execution.run import Query
 from scenicq.store.read_lock import Reading, nobody_reads
@@ -176,7 +176,7 @@ def _run(client: Any, query: Query, pieces: Iterable[DatasetPiece]) -> Iterator[
             try:
                 done = _taken(client, future)
             except KilledWorker:
-                done = alone(query, piece)
+                done = run_frame_by_frame(query, piece)
             future.release()
             yield piece, done
     except (OSError, CancelledError) as error:

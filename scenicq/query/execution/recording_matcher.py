@@ -37,7 +37,7 @@ from scenicq.temporal.hidden_runs import Remembered
 from scenicq.temporal.intervals import IntervalMatcher, IntervalVerdict
 from scenicq.temporal.necessary import NecessaryConditions
 from scenicq.temporal.outcomes import Outcome
-from scenicq.temporal.starts import RoleCandidates, StartSearch, narrowed, start_matchers
+from scenicq.temporal.starts import RoleCandidates, StartSearch, narrow_candidates, start_matchers
 from scenicq.temporal.stretches import StartTable
 from scenicq.temporal.truth import TRUE, UNKNOWN
 
@@ -124,7 +124,7 @@ class _Asked:
         candidates = self.candidates
         if candidates is not None:
             place = np.searchsorted(candidates.labels, self.block.label_of[candidates.members])
-            candidates = narrowed(candidates, which, place)
+            candidates = narrow_candidates(candidates, which, place)
         return _Asked(self.block, self.labels[which], candidates, self.read)
 
 

@@ -23,7 +23,7 @@ from scenicq.geometry.abstract_map import AbstractNetwork, NeedsMapError
 from scenicq.geometry.map_traits import MapTraits
 from scenicq.geometry.network import Network
 from scenicq.match.options import MatchOptions
-from scenicq.match.problem.preprocess import ready
+from scenicq.match.problem.preprocess import prepare_scenario
 from scenicq.match.verdict import Cause, NoMatch
 from scenicq.query.execution.block_executor import BlockExecutor
 from scenicq.query.execution.block_matcher import MAPS_KEPT, CompiledMap, Decided, Decider, has_timelines
@@ -220,7 +220,7 @@ class Query:
             label_attributes=self._label_attributes,
         )  # fmt: skip
         check_enforced(scenario, self.options.match.enforce)
-        return ready(scenario)
+        return prepare_scenario(scenario)
 
     def _label_attributes(self) -> Mapping[str, frozenset[type]]:
         if self._known.attributes is None:

@@ -32,9 +32,9 @@ __all__ = [
     "change_tolerance",
     "combine",
     "drop_requirement",
+    "find_least",
     "ignore_param",
     "interval_length",
-    "least",
     "longest_with",
     "shift_comparison",
     "show_tolerance",
@@ -91,7 +91,7 @@ class Change:
         return CompiledMap.of(scenario, world.network, changed.match, prefilter=changed.prefilter), changed
 
 
-def least(
+def find_least(
     holds: Callable[[float], bool], ladder: Sequence[float], *, low: float = 0.0, finest: float = FINEST_M,
     relative: float = 0.0,
 ) -> float | None:  # fmt: skip

@@ -28,7 +28,7 @@ from scenicq.query.execution.own_lanes import OwnLanes, show_standing
 from scenicq.query.execution.results import Standing
 from scenicq.query.explain.changes import show_tolerance
 from scenicq.query.explain.margins import SatisfiedConstraint, margins
-from scenicq.query.explain.nearest_miss import Closest, closest, separated
+from scenicq.query.explain.nearest_miss import Closest, closest, narrow_advice
 from scenicq.query.explain.violations import Violation, violations
 from scenicq.smt.smtlib import to_smtlib
 from scenicq.store.labels import Label
@@ -100,7 +100,7 @@ def explain(matcher: Matcher, label: Label, *, formulas: bool = False) -> Explan
     nearest = closest(matcher, label)
     if nearest is None or not isinstance(nearest.finding.verdict, Match):
         return _without_match(matcher, label, finding, formulas=formulas)
-    nearest = separated(matcher, label, nearest)
+    nearest = narrow_advice(matcher, label, nearest)
     assert isinstance(nearest.finding.verdict, Match)
     found = replace(nearest.finding, search=_again(matcher, nearest.finding))
     return Explanation(

@@ -32,7 +32,7 @@ from scenicq.temporal.intervals import IntervalMatcher, IntervalVerdict
 from scenicq.temporal.starts import start_matchers
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN
 
-__all__ = ["IntervalExplanation", "changes_of", "explain_beginning", "explain_recording", "placed"]
+__all__ = ["IntervalExplanation", "changes_of", "explain_beginning", "explain_recording", "locate_interval"]
 
 
 _AROUND_SHOWN = 5
@@ -390,7 +390,7 @@ def _is_after(block: TrackBlock, start: _Start, samples: Mapping[tuple[tuple[int
     return binding in samples and int(block.label_of[next(iter(members.values()))]) >= samples[binding]
 
 
-def placed(query: Query, result: Result) -> tuple[Scenario, RecordingTracks, IntervalVerdict]:
+def locate_interval(query: Query, result: Result) -> tuple[Scenario, RecordingTracks, IntervalVerdict]:
     """The interval of a result: the scenario over its map, its recording, and where in it who plays whom.
 
     Raises:

@@ -27,7 +27,7 @@ from scenicq.match.explanation import (
 )
 from scenicq.match.matcher import Matcher
 from scenicq.match.tolerance import Tolerance
-from scenicq.query.explain.changes import least
+from scenicq.query.explain.changes import find_least
 from scenicq.query.explain.sides import sides
 
 __all__ = ["Violation", "allowed_values", "choices", "distance_off", "violations"]
@@ -191,4 +191,4 @@ def distance_off(constraint: Comparison, node: Node, observed: Value) -> float |
         wide = Tolerance(position=size, heading=size, other=size)
         return isinstance(decide_decomposed([(constraint, node, observed)], wide), Satisfied)
 
-    return 0.0 if reached(0.0) else least(reached, [high], finest=_FINEST)
+    return 0.0 if reached(0.0) else find_least(reached, [high], finest=_FINEST)

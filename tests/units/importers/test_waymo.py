@@ -17,7 +17,7 @@ from scenicq.importers.base import ImportOptions
 from scenicq.importers.fields import InvalidError
 from scenicq.importers.ingest import ingest
 from scenicq.importers.lane_parts import Beside, cut_lanes
-from scenicq.importers.protobuf import integers, parse, signed
+from scenicq.importers.protobuf import integers, parse, to_signed
 from scenicq.importers.report import Report
 from scenicq.importers.tfrecord import crc32c, records
 from scenicq.importers.waymo import Waymo
@@ -60,7 +60,7 @@ def test_messages() -> None:
     assert list(integers(message[2])) == [1, 127]
     assert message[3] == [1.0]
     assert message[4] == [1.0]
-    assert signed(parse(b"\x08" + b"\xff" * 9 + b"\x01")[1][0]) == -1
+    assert to_signed(parse(b"\x08" + b"\xff" * 9 + b"\x01")[1][0]) == -1
 
 
 @pytest.mark.parametrize("content", [b"\x08", b"\x12\x05ab", b"\x19abc", b"\x0b", b"\xff" * 12, b"\x08" + b"\x80" * 20])

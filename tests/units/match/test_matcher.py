@@ -257,7 +257,7 @@ def test_what_the_solver_does_not_decide_is_unknown_with_its_reason(method, reas
 @pytest.mark.parametrize("method", ["auto", "smt", "monolithic"])
 def test_what_the_built_in_solver_leaves_open_is_unknown_where_there_is_no_other(method, solver, monkeypatch):
     # nor is a question made that nobody is asked: for fields at hidden points that takes seconds
-    monkeypatch.setattr(solver_step, "encoded", None)
+    monkeypatch.setattr(solver_step, "encode_groups", None)
     assert verdict(NONLINEAR, frame(THERE), solver, method=method).reason == "nonlinear"
 
 

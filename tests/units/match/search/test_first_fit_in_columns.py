@@ -15,7 +15,7 @@ from programs import HEADER, PROGRAMS
 from scenes import STREET, compiled, drawn, label_of
 
 from scenicq.garbage import without_collector
-from scenicq.match.decide.range_forms import clipped, turned
+from scenicq.match.decide.range_forms import clip, cos_sin
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import candidates_of
@@ -169,11 +169,11 @@ numbers = st.floats(allow_nan=False, allow_infinity=False, width=64)
 @given(st.lists(st.tuples(numbers, numbers, numbers), min_size=1, max_size=20))
 def test_columns_are_what_numbers_are(rows):
     values, lows, highs = (np.array(each) for each in zip(*rows, strict=True))
-    one_by_one = [clipped(*row) for row in rows]
-    together = clipped(values, lows, highs).tolist()
+    one_by_one = [clip(*row) for row in rows]
+    together = clip(values, lows, highs).tolist()
     assert list(map(repr, together)) == list(map(repr, one_by_one))
-    cosines, sines = turned(values)
-    assert [*zip(cosines.tolist(), sines.tolist(), strict=True)] == [turned(float(value)) for value in values]
+    cosines, sines = cos_sin(values)
+    assert [*zip(cosines.tolist(), sines.tolist(), strict=True)] == [cos_sin(float(value)) for value in values]
     assert math.cos(rows[0][0]) == cosines[0]
 
 

@@ -16,7 +16,7 @@ from scenicq.match.tolerance import EXACT, Tolerance, parse_tolerance
 from scenicq.match.verdict import Match, NoMatch
 from scenicq.query.explain.changes import show_tolerance
 from scenicq.query.explain.frame_explanation import explain, show_explanation
-from scenicq.query.explain.nearest_miss import closest, separated, widened
+from scenicq.query.explain.nearest_miss import closest, narrow_advice, widen_tolerance
 from scenicq.store.labels import Label, LabelObject
 
 STREET = street()
@@ -104,7 +104,7 @@ def test_formulas_are_smtlib_with_their_verdicts():
 @pytest.mark.parametrize("widening", [0.0, 0.3, 2.0, 50.0])
 @pytest.mark.parametrize("base", [Tolerance(), Tolerance(x=0.2, y=0.3, heading=0.1)])
 def test_widening_is_monotone_in_every_part(widening, base):
-    small, large = widened(base, widening), widened(base, widening + 0.1)
+    small, large = widen_tolerance(base, widening), widen_tolerance(base, widening + 0.1)
     assert large.position > small.position >= base.position
     assert large.other > small.other
     assert math.pi >= large.heading >= small.heading >= base.heading
@@ -123,7 +123,7 @@ def test_the_smallest_tolerance_is_smallest_and_is_enough(x, heading):
     wanted = max(abs(x - 1.75), turned) - 1e-3
     assert found.widening_m == pytest.approx(wanted, rel=0.02, abs=4e-3)
     assert isinstance(matcher(tolerance=found.tolerance).match(label), Match)
-    too_small = widened(EXACT, 0.95 * wanted - 2e-3)
+    too_small = widen_tolerance(EXACT, 0.95 * wanted - 2e-3)
     assert isinstance(matcher(tolerance=too_small).match(label), NoMatch)
 
 
@@ -145,7 +145,7 @@ def test_what_matches_needs_no_wider_tolerance():
 
 def advised(label, text=TEXT, **options):
     mine = matcher(text, **options)
-    return separated(mine, label, closest(mine, label))
+    return narrow_advice(mine, label, closest(mine, label))
 
 
 def test_a_part_that_is_enough_alone_is_advised_alone():
