@@ -43,7 +43,7 @@ from .options import add_options, by_topic
 from .output import choose_format, destination, writing
 from .path_type import ANY_PATH, LOCAL_PATH, chosen_file
 from .programs import read_scenario
-from .report import columns, plain, show
+from .report import columns, printable, show
 from .sources import SENSORS, sensor_root
 
 __all__ = ["evaluate"]
@@ -165,9 +165,9 @@ def _text(found: ModelsEvaluation) -> str:
     if found.only is not None:
         return "\n".join(_model(found.only))
     lines = [*_titled(models_table(found)), ""]
-    lines += [plain(each.sentence) for each in found.pairs]
+    lines += [printable(each.sentence) for each in found.pairs]
     for name, each in found.models.items():
-        lines += ["", plain(name), "", *_model(each)]
+        lines += ["", printable(name), "", *_model(each)]
     return "\n".join(lines)
 
 
@@ -185,10 +185,10 @@ def _model(found: Evaluation) -> list[str]:
         for table in tables(each, found.within):
             lines += ["", *_titled(table)]
         lines.append("")
-        lines += [plain(one.sentence) for one in (*each.headline, *each.weighted)]
-        lines += [plain(one.beside) for one in each.headline if one.asked]
+        lines += [printable(one.sentence) for one in (*each.headline, *each.weighted)]
+        lines += [printable(one.beside) for one in each.headline if one.asked]
         if each.simulated is not None:
-            lines.append(plain(each.simulated.sentence))
+            lines.append(printable(each.simulated.sentence))
         lines.append("")
     if found.benchmark is not None:
         lines += [found.benchmark.sentence, ""]

@@ -28,7 +28,7 @@ from scenicq.query.execution.result_summary import ResultSummary
 from scenicq.query.execution.result_tables import result_schema, result_table, summary_metadata
 from scenicq.store.frame_names import ShortNames
 
-from .report import plain
+from .report import printable
 from .table import Table, TextStream
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ class _Names:
 
     def write(self, record: Record) -> None:
         if record.verdict == "match":
-            self._text.write(plain(record.name).replace("\n", "\\n") + "\n")
+            self._text.write(printable(record.name).replace("\n", "\\n") + "\n")
             self._text.flush()
 
     def finish(self, summary: ResultSummary | None = None) -> None:

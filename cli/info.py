@@ -23,7 +23,7 @@ from scenicq.store.verification import verify_computed
 from .datasets import open_checked
 from .ingest import defects
 from .manual import Manual
-from .report import columns, count, is_date, moment, plain, show_few
+from .report import columns, count, is_date, moment, printable, show_few
 from .streams import say
 
 __all__ = ["info"]
@@ -60,7 +60,7 @@ def _values(said: SaidValues) -> str:
 
 
 def _short(text: str) -> str:
-    told = plain(text).replace("\n", " ")
+    told = printable(text).replace("\n", " ")
     return told if len(told) <= _WIDEST else f"{told[: _WIDEST - 3]}..."
 
 
@@ -228,4 +228,4 @@ def info(dataset: str, *, verify: bool, named: bool, format_: str) -> None:
             lines = [*_lines(opened, fits, named=named)]
         show_few(misfits(fits))
         lines += ["every checksum is right, and every value is sound"] if verify else []
-        say(plain("\n".join(lines)))
+        say(printable("\n".join(lines)))

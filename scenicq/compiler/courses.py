@@ -25,7 +25,7 @@ from scenicq.limits import LIMITS
 if TYPE_CHECKING:
     from scenicq.compiler.interpreter import Interpreter
 
-__all__ = ["Course", "as_test", "option_of", "split_by_course", "without_courses"]
+__all__ = ["Course", "as_test", "forbid_courses", "option_of", "split_by_course"]
 
 
 class Course:
@@ -88,7 +88,7 @@ def _on(run: Interpreter, course: Course) -> Generator[None]:
         run.course = before
 
 
-def without_courses(run: Interpreter) -> AbstractContextManager[None]:
+def forbid_courses(run: Interpreter) -> AbstractContextManager[None]:
     """While what is evaluated must have one course, although objects are read as a label shows them."""
     return _on(run, Course())
 

@@ -16,7 +16,7 @@ from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.forest.nodes import Identity, Index, LogicOp, Node, Select
 
-__all__ = ["Exclusions", "with_exclusions"]
+__all__ = ["Exclusions", "collect_exclusions"]
 
 if TYPE_CHECKING:
     from scenicq.compiler.interpreter import Interpreter
@@ -133,7 +133,7 @@ class Exclusions:
         return [(_condition(choice), _with_owner(choice.span)) for choice in self._found.values()]
 
 
-def with_exclusions(run: Interpreter, work: Callable[[], _Result]) -> tuple[_Result, list[tuple[Node, Span]]]:
+def collect_exclusions(run: Interpreter, work: Callable[[], _Result]) -> tuple[_Result, list[tuple[Node, Span]]]:
     """What is worked out, with what it excludes: the scene as a whole excludes nothing of that."""
     of_scene, run.excluded = run.excluded, Exclusions()
     try:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, assert_never, cast
 
-from scenicq.compiler.arithmetic import no_number
+from scenicq.compiler.arithmetic import number_error
 from scenicq.compiler.assignment import assign
 from scenicq.compiler.classes import bind_arguments, define_class, refuse_decorators
 from scenicq.compiler.coerce import to_region, to_scalar
@@ -309,7 +309,7 @@ class Interpreter:
             try:
                 self._execute(statement, scope)
             except ArithmeticError as error:
-                raise no_number(error, statement.span, "in this statement") from None
+                raise number_error(error, statement.span, "in this statement") from None
 
     def _execute(self, node: ast.Statement, scope: Environment) -> None:
         self.budget.step(node.span)

@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "count",
-    "how_many",
+    "count_others",
     "is_element",
     "is_nearest",
     "list_elements",
@@ -79,7 +79,7 @@ def others(run: Interpreter, span: Span, *args: ModelValue, **named: ModelValue)
 def count(run: Interpreter, span: Span, *args: ModelValue, **named: ModelValue) -> ModelValue:
     """`count(C, within=R, ahead=True)`."""
     if args and isinstance(args[0], OtherList) and len(args) == 1 and not named:
-        return how_many(args[0], span)
+        return count_others(args[0], span)
     cls = _class(run, span, "count", args, named, _FILTERS)
     every = __all_of(run, cls, span)
     element = _element(every, span)
@@ -178,7 +178,7 @@ def truth_of_list(op: str, items: OtherList, span: Span) -> Node:
     return _among(AmongOp.EVERY, items.objects, items.element, wanted, span)
 
 
-def how_many(items: OtherList | LabelObjects, span: Span) -> Node:
+def count_others(items: OtherList | LabelObjects, span: Span) -> Node:
     """`len` of a list, or of all others."""
     if isinstance(items, LabelObjects):
         return _among(AmongOp.COUNT, items, _element(items, span), build.constant(True), span)

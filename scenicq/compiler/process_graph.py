@@ -19,9 +19,9 @@ from scenicq.compiler.assignment import assign
 from scenicq.compiler.coerce import read_over_time, to_boolean
 from scenicq.compiler.contracts import Contract, action_contract, behavior_contract
 from scenicq.compiler.coroutines import CoroutineCall, LibraryCall, MonitorDefinition, ScenarioDefinition, as_behavior
-from scenicq.compiler.courses import split_by_course, without_courses
+from scenicq.compiler.courses import forbid_courses, split_by_course
 from scenicq.compiler.environment import Environment
-from scenicq.compiler.exclusions import with_exclusions
+from scenicq.compiler.exclusions import collect_exclusions
 from scenicq.compiler.items import items_of
 from scenicq.compiler.local_values import HERE, Held, LocalValues
 from scenicq.compiler.logic import condition
@@ -147,7 +147,7 @@ class ProcessGraph:
     def follow(self, start: ProcessState) -> None:
         """Follow it from its start."""
         self.number(start)
-        with read_over_time(), without_courses(self.run):
+        with read_over_time(), forbid_courses(self.run):
             while self._todo:
                 number, state = self._todo.pop()
                 found = self.next_of(state)
@@ -268,7 +268,7 @@ class ProcessGraph:
 
     def excluding(self, work: Callable[[], _Result]) -> tuple[_Result, GraphGuards]:
         """What is worked out, with what it excludes."""
-        found, excluded = with_exclusions(self.run, work)
+        found, excluded = collect_exclusions(self.run, work)
         return found, tuple(excluded)
 
     def test(

@@ -13,7 +13,7 @@ from typing import TypeVar, cast
 from scenicq.budget import Exhausted, limited
 from scenicq.compiler import operators
 from scenicq.compiler.absent import check_directions, list_names
-from scenicq.compiler.arithmetic import no_number
+from scenicq.compiler.arithmetic import number_error
 from scenicq.compiler.coerce import PARTIAL, to_node, to_region, to_scalar, to_vector
 from scenicq.compiler.composition_graph import ComposedScenario
 from scenicq.compiler.deviations import is_zero
@@ -300,7 +300,7 @@ def _at_the_end(work: Callable[[], _Result], span: Span | None) -> _Result:
     try:
         return work()
     except ArithmeticError as error:
-        raise no_number(error, span, "of this") from None
+        raise number_error(error, span, "of this") from None
 
 
 def _names(objects: list[Instance]) -> list[str]:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Literal, cast
 from scenicq.compiler.coerce import kind_of_model, read_over_time, to_node
 from scenicq.compiler.courses import split_by_course
 from scenicq.compiler.environment import Environment
-from scenicq.compiler.exclusions import with_exclusions
+from scenicq.compiler.exclusions import collect_exclusions
 from scenicq.compiler.requirements import defer_value
 from scenicq.compiler.values import Delayed, ModelValue, describe, fail
 from scenicq.errors import Diagnostic, ScenarioError, Span, printable
@@ -98,7 +98,7 @@ def recorded_values(run: Interpreter) -> tuple[RecordedValue, ...]:
     for each in run.records:
         try:
             with read_over_time():
-                value, excluded = with_exclusions(run, each.value)
+                value, excluded = collect_exclusions(run, each.value)
         except ScenarioError as error:
             for told in error.diagnostics:
                 message = f"`{each.name}` is not recorded: {told.message}"

@@ -14,7 +14,7 @@ from scenicq.compiler.comparisons import compare
 from scenicq.compiler.expressions import call
 from scenicq.compiler.items import components, is_vector, items_of
 from scenicq.compiler.known_properties import as_constant, known_truth
-from scenicq.compiler.other_objects import how_many, truth_of_list
+from scenicq.compiler.other_objects import count_others, truth_of_list
 from scenicq.compiler.random_values import each_existing, is_choice
 from scenicq.compiler.rounding import sort_numbers
 from scenicq.compiler.values import Builtin, Choice, Function, LabelObjects, ModelValue, OtherList, fail
@@ -115,7 +115,7 @@ def sequence_functions(run: Interpreter) -> dict[str, ModelValue]:
 
         def apply_to(span: Span, *args: ModelValue) -> ModelValue:
             if name == "len" and len(args) == 1 and isinstance(args[0], OtherList | LabelObjects):
-                return how_many(args[0], span)
+                return count_others(args[0], span)
             return plain.call(span, *(components(run, each, span) if is_vector(each) else each for each in args))
 
         return apply_to

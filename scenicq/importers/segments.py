@@ -20,11 +20,11 @@ import numpy as np
 from msgspec import structs
 
 from scenicq.errors import DataError, Diagnostic
-from scenicq.garbage import without_collector
+from scenicq.garbage import pause_collector
 from scenicq.importers.base import LabelChecker, RecordingEntry, RecordingReader
 from scenicq.importers.recording_checks import tell_recording
 from scenicq.importers.report import MOST_TOLD, Report
-from scenicq.processes import Lost, Workers, as_many_as_pay
+from scenicq.processes import Lost, Workers, default_processes
 from scenicq.store.schema import SCHEMA_VERSION, SEGMENT_TABLES, ArrowTable
 from scenicq.store.segment import MapIndexes, Segment, SegmentWriter, SourceRecording
 
@@ -182,7 +182,7 @@ def write_segments(
     """
     many = 1 if len(jobs) <= 1 else at_once
     if not many:
-        many = as_many_as_pay()
+        many = default_processes()
     if many > 1:
         yield from _write_apart(world, jobs, many, on_recording)
         return
@@ -217,7 +217,7 @@ def _write(world: World, job: Job, indexes: MapIndexes, on_recording: OnRecordin
     pieces: dict[str, SourceRecording] = {}
     messages: Counter[tuple[str, str]] = Counter()
     try:
-        with without_collector(), closing(_OldRows()) as old:
+        with pause_collector(), closing(_OldRows()) as old:
             writer.open()
             for place, shares in groupby(job.shares, lambda share: share.old):
                 together = list(shares)

@@ -22,7 +22,7 @@ from typing import IO, Self
 from scenicq.budget import leave_out, stop_clock
 from scenicq.errors import Diagnostic, SolverError
 from scenicq.limits import LIMITS
-from scenicq.processes import end_group, ended_after
+from scenicq.processes import end_group, kill_after
 from scenicq.smt.answer import Answer, NoAnswer, Sat
 from scenicq.smt.problem import Problem, holds
 from scenicq.smt.worker import Request, Setup, read_answer, seconds_of
@@ -191,7 +191,7 @@ class WorkerSolver:
         requests, answers = _pipes(process)
         line = b""
         # a process that has ended neither reads nor writes
-        with ended_after(process, timeout_s) as expired, contextlib.suppress(OSError):
+        with kill_after(process, timeout_s) as expired, contextlib.suppress(OSError):
             requests.write(message)
             requests.flush()
             line = answers.readline(LIMITS.worker_answer_bytes + 1)

@@ -39,7 +39,15 @@ from scenicq.forest.nodes import (
 from scenicq.forest.walk import children, leaves, postorder, transform
 from scenicq.temporal.atoms import AtomColumns, UnclearVariable
 
-__all__ = ["affine_sides", "comparisons_of", "has_cuts", "possibly", "random_variables", "support", "value_between"]
+__all__ = [
+    "affine_sides",
+    "comparisons_of",
+    "has_cuts",
+    "necessary_condition",
+    "random_variables",
+    "support",
+    "value_between",
+]
 
 
 def random_variables(conditions: Iterable[Node]) -> list[Leaf]:
@@ -113,7 +121,7 @@ def has_cuts(condition: Node) -> bool:
     )
 
 
-def possibly(condition: Node) -> Node | None:
+def necessary_condition(condition: Node) -> Node | None:
     """What holds wherever a condition does for some values of random variables; None if that is not known.
 
     A comparison that is affine in a bounded number holds for some value of it if it does for the least or the greatest.

@@ -33,7 +33,7 @@ from scenicq.forest.walk import features, postorder
 from scenicq.store.track_block import TrackBlock, in_order
 from scenicq.temporal.atoms import AtomColumns, reads_start
 from scenicq.temporal.first_exits import next_at
-from scenicq.temporal.hidden import possibly
+from scenicq.temporal.hidden import necessary_condition
 from scenicq.temporal.required import Required
 from scenicq.temporal.samples import MOVING, BoundSamples
 from scenicq.temporal.starts import RoleCandidates, narrow_candidates
@@ -74,7 +74,7 @@ class NecessaryConditions:
         some: list[tuple[Atom, ...]] = [(atom,) for atom in required.later]
         if required.ends and self.within_s is None:
             some.append(required.ends)
-        conditions = [possibly(each) for each in dynamics.conditions]
+        conditions = [necessary_condition(each) for each in dynamics.conditions]
         for atom in (*required.at_start, *required.always):
             condition = conditions[atom.number]
             if condition is not None and (role := self._role([condition])) is not None:

@@ -287,7 +287,7 @@ def test_as_many_processes_as_are_asked_for_or_pay(dataset: Dataset, monkeypatch
     monkeypatch.setattr(executors, "processes", lambda count: count)
     assert [local_executor(query(dataset, jobs=jobs)) for jobs in (1, None, 2, 5)] == [run_here, run_here, 2, 5]
     monkeypatch.setattr(executors, "PIECE_FRAMES", 20)
-    monkeypatch.setattr(executors, "as_many_as_pay", lambda: 4)
+    monkeypatch.setattr(executors, "default_processes", lambda: 4)
     assert local_executor(query(dataset, jobs=None)) == 4
 
 

@@ -16,12 +16,12 @@ from scenicq.match.problem.candidates import LabelProblem
 from scenicq.store.classes import Granularity, class_truth
 from scenicq.store.labels import Label, LabelObject
 
-__all__ = ["elements_of", "who_plays"]
+__all__ = ["elements_of", "observe_roles"]
 
 _WHO = (IDENTITY, TRACK)
 
 
-def who_plays(problem: LabelProblem, assignment: Mapping[int, int]) -> dict[tuple[int, str], Value]:
+def observe_roles(problem: LabelProblem, assignment: Mapping[int, int]) -> dict[tuple[int, str], Value]:
     """All label objects of a label, and which of them play the scenario's objects, as what is observed of it.
 
     Args:

@@ -46,7 +46,7 @@ from scenicq.forest.value_numbers import ValueNumbers, parts_of
 from scenicq.forest.walk import children, features, is_leaf, leaves, postorder
 from scenicq.match.tolerance import Tolerance
 
-__all__ = ["GroupShape", "classes_of_twins", "in_one_order", "interchangeable", "shape_of"]
+__all__ = ["GroupShape", "classes_of_twins", "interchangeable", "shape_of", "sort_interchangeable"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,7 +167,7 @@ def classes_of_twins(twins: Mapping[int, int]) -> list[list[int]]:
     return list(found.values())
 
 
-def in_one_order(assignment: Mapping[int, int], twins: Mapping[int, int]) -> frozenset[tuple[int, int]]:
+def sort_interchangeable(assignment: Mapping[int, int], twins: Mapping[int, int]) -> frozenset[tuple[int, int]]:
     """Who plays whom, interchangeable objects in ascending order.
 
     Args:

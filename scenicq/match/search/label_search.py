@@ -26,10 +26,10 @@ from scenicq.match.problem.conditioned import Item
 from scenicq.match.problem.constraints import Signature
 from scenicq.match.problem.map_lookups import MapLookups
 from scenicq.match.problem.outcome import Outcome, Patience, Refuted, Satisfied, Search, Undecided
-from scenicq.match.problem.symmetry import in_one_order
+from scenicq.match.problem.symmetry import sort_interchangeable
 from scenicq.match.search.arc_consistency import arc_consistent
 from scenicq.match.search.backtracking import Consistency, Reporter, find_assignments
-from scenicq.match.search.group_cache import POSTPONED, GroupCache, known_of, rename_variables, surely
+from scenicq.match.search.group_cache import POSTPONED, GroupCache, certain_group, possible_outcome, rename_variables
 from scenicq.match.search.group_plan import GroupPlan, MatchPlan
 
 __all__ = ["Failure", "LabelSearch", "Solution"]
@@ -195,7 +195,7 @@ class LabelSearch:
     def _is_new(self, assignment: Mapping[int, int], twins: Mapping[int, int]) -> bool:
         """Whether a correspondence is told for the first time, in whatever order interchangeable objects are."""
         # objects of which a label tells more or less come in another order in another signature
-        order = in_one_order(assignment, twins)
+        order = sort_interchangeable(assignment, twins)
         if order in self._orders:
             return False
         self._orders.add(order)
@@ -459,9 +459,9 @@ class LabelSearch:
             groups = [each.group for each in plan.groups]
             doubtful = [group for group in groups if group.doubtful or self._decisions.has_doubts(group, assignment)]
             if doubtful and isinstance(outcome, Satisfied):
-                sure = [surely(group) if group.doubtful else group for group in groups]
-                items = [self._decisions.items(group, assignment, surely=True) for group in sure]
-                outcome = known_of(doubtful[0], self.ask(items))
+                sure = [certain_group(group) if group.doubtful else group for group in groups]
+                items = [self._decisions.items(group, assignment, certain=True) for group in sure]
+                outcome = possible_outcome(doubtful[0], self.ask(items))
             return outcome
         except CannotEvaluate as error:
             return Undecided(plan.groups[0].group.constraints[0], f"unsupported: {error}")

@@ -12,12 +12,12 @@ from collections.abc import Callable, Generator, Iterable
 from dataclasses import dataclass, replace
 
 from scenicq.errors import Source
-from scenicq.processes import Lost, Workers, as_many_as_pay
+from scenicq.processes import Lost, Workers, default_processes
 from scenicq.query.execution.pieces import DatasetPiece, find_finished, gather, partitions, write_piece
 from scenicq.query.execution.program_files import SiblingFiles
 from scenicq.query.execution.question_notes import name_question
 from scenicq.query.execution.records import read_record, record
-from scenicq.query.execution.results import Funnel, Result, up_to
+from scenicq.query.execution.results import Funnel, Result, limit_matches
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.dataset import DatasetReference
 from scenicq.store.remote_path import AnyPath
@@ -136,7 +136,7 @@ def local_executor(query: Query) -> Executor:
     """The executor that runs pieces here, or in as many processes as the query's options say or as pay."""
     jobs = query.options.jobs
     if jobs is None:
-        jobs = min(as_many_as_pay(), query.dataset.manifest.total.frames // PIECE_FRAMES)
+        jobs = min(default_processes(), query.dataset.manifest.total.frames // PIECE_FRAMES)
     return processes(jobs) if jobs > 1 else run_here
 
 
@@ -188,7 +188,7 @@ def ordered_results(
         pieces: All of them.
         progress: Called with the number of frames decided since the last call.
     """
-    return up_to(query.limit, _put_together(query, executor, pieces, progress), query.funnel)
+    return limit_matches(query.limit, _put_together(query, executor, pieces, progress), query.funnel)
 
 
 def _put_together(

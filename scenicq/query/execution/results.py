@@ -25,7 +25,7 @@ __all__ = [
     "Result",
     "Sample",
     "Standing",
-    "up_to",
+    "limit_matches",
 ]
 
 RecordedCell = float | bool | str | tuple[float, float] | None
@@ -310,7 +310,7 @@ class Funnel:
                 failed[verdict.cause.what] += 1
 
 
-def up_to(limit: int | None, found: Generator[Result], funnel: Funnel) -> Generator[Result]:
+def limit_matches(limit: int | None, found: Generator[Result], funnel: Funnel) -> Generator[Result]:
     """Results until so many matches are there; then whoever gives them is closed.
 
     Args:

@@ -40,7 +40,7 @@ from scenicq.query.execution.never_compared import Coverage, coverage
 from scenicq.query.execution.program_files import SiblingFiles
 from scenicq.query.execution.recorded_columns import RecordedColumn, columns_of
 from scenicq.query.execution.result_selection import ResultSelection
-from scenicq.query.execution.results import Funnel, Result, up_to
+from scenicq.query.execution.results import Funnel, Result, limit_matches
 from scenicq.query.execution.scenario_copies import ScenarioCopies
 from scenicq.query.prefilter.executor import Block, Extent, blocks, blocks_of, extents, names, whole_recordings
 from scenicq.query.prefilter.plan import Plan
@@ -591,7 +591,7 @@ class Query:
         Raises:
             ScenarioError: The program is wrong or not supported.
         """
-        return up_to(self.limit, self._all_results(progress), self.funnel)
+        return limit_matches(self.limit, self._all_results(progress), self.funnel)
 
     def _all_results(self, progress: Callable[[int], None] | None) -> Generator[Result]:
         lacking = self._lacking_maps()

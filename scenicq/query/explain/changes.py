@@ -35,7 +35,7 @@ __all__ = [
     "find_least",
     "ignore_param",
     "interval_length",
-    "longest_with",
+    "longest_interval",
     "shift_comparison",
     "show_tolerance",
     "skip_property",
@@ -119,7 +119,7 @@ def find_least(
     return high
 
 
-def longest_with(query: Query, recording: str, map_name: str, change: Change) -> Result | None:
+def longest_interval(query: Query, recording: str, map_name: str, change: Change) -> Result | None:
     """The longest interval of a recording that matches with a change, given its map; None where none does."""
     compiled, options = change.compiled(query.compiled_map(map_name), query.options)
     results = query.alone(recording, map_name, compiled, options).results()

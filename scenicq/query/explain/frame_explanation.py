@@ -20,7 +20,7 @@ from scenicq.match.explanation import (
     Satisfied,
     Undecided,
     describe_constraint,
-    encoded,
+    encode_groups,
 )
 from scenicq.match.matcher import Matcher
 from scenicq.match.verdict import Match, NoMatch, Unknown, Verdict, WitnessValue
@@ -217,7 +217,7 @@ def _formula(
     outcome = attempt.decide(plan.groups[number - 1], assignment)
     verdict = {Satisfied: "sat", Refuted: "unsat", Undecided: "unknown"}[type(outcome)]
     try:
-        problem = encoded([attempt.items(group, assignment)], matcher.options).problem
+        problem = encode_groups([attempt.items(group, assignment)], matcher.options).problem
         text = to_smtlib(problem, matcher.options.precision)
     except CannotEvaluate as error:
         text = f"; no formula: {error}\n"

@@ -19,7 +19,7 @@ from scenicq.query.execution.recording_starts import DecidedStart, few_findings,
 from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query
 from scenicq.query.explain.bands import Band, bands_of, columns_of, conditions_over, show_bands
-from scenicq.query.explain.changes import longest_with, shift_comparison
+from scenicq.query.explain.changes import longest_interval, shift_comparison
 from scenicq.query.explain.frame_explanation import explain, show_explanation
 from scenicq.query.explain.interval_changes import Shift, least_changes
 from scenicq.query.explain.mode_explanation import run_modes
@@ -258,7 +258,7 @@ def _explain_variant(
     # one of several variants is not tried again by itself
     tried = () if query.compiled_map(labels[0].map).scenario.variants else changes_of(scenario, tracks, best)
     shifts = [shift_comparison(each, best.broken) for each in tried[: LIMITS.ranked_numbers]]
-    changes = tuple(each.text for each in shifts if longest_with(query, name, labels[0].map, each) is not None)
+    changes = tuple(each.text for each in shifts if longest_interval(query, name, labels[0].map, each) is not None)
     over = conditions_over(scenario, tracks, best)
     bands = bands_of(scenario, over)
     least_s = None if dynamic else query.options.time.min_duration_s

@@ -25,7 +25,7 @@ from scenicq.query.explain.changes import (
     change_tolerance,
     find_least,
     interval_length,
-    longest_with,
+    longest_interval,
     shift_comparison,
     show_tolerance,
 )
@@ -121,7 +121,7 @@ def _tries(query: Query, recording: str) -> Callable[[Change], Result | None]:
     with query.dataset.connect() as connection:
         found = connection.execute("SELECT map FROM labels WHERE recording = ? LIMIT 1", [recording]).fetchone()
     assert found is not None
-    return partial(longest_with, query, recording, found[0])
+    return partial(longest_interval, query, recording, found[0])
 
 
 def _near(found: Result | None, change: Change) -> _Near | None:

@@ -11,7 +11,7 @@ from scenicq.errors import CannotEvaluate
 from scenicq.forest.groups import PARAMS, Condition, Group
 from scenicq.forest.nodes import Compare, Constant, Distance, Identity, Logic, LogicOp, Node, Norm, Value
 from scenicq.forest.walk import features, leaves
-from scenicq.match.explanation import LabelSearch, conditioned
+from scenicq.match.explanation import LabelSearch, condition_items
 
 __all__ = ["Side", "amount", "sides"]
 
@@ -106,6 +106,6 @@ def _known(
         items = attempt.items(alone, assignment)
     except CannotEvaluate:
         return None
-    part = conditioned(items, values)[0][1]
+    part = condition_items(items, values)[0][1]
     known = part.value if isinstance(part, Constant) else None
     return known if isinstance(known, float) else None

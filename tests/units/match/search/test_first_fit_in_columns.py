@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from programs import HEADER, PROGRAMS
 from scenes import STREET, compiled, drawn, label_of
 
-from scenicq.garbage import without_collector
+from scenicq.garbage import pause_collector
 from scenicq.match.decide.range_forms import clip, cos_sin
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
@@ -157,7 +157,7 @@ def test_labels_are_let_go_without_the_collector(name):
     matcher = Matcher(scenario, MatchOptions())
     asked = with_candidates(matcher.scenario, MatchOptions(), labels(scenario, range(4)))
     gc.collect()
-    with without_collector():
+    with pause_collector():
         assert list(matcher.match_all(asked))
         assert not [each for each in gc.get_objects() if isinstance(each, LabelRow)]
 
