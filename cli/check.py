@@ -75,7 +75,7 @@ def networks_of(
         except DataError as error:
             if warnings is None:
                 raise
-            more = ("until then, the built-in street stands in",)
+            more = ("until then, the built-in street is used instead",)
             warnings += [replace(each, hints=(*each.hints, *more), severity="warning") for each in error.diagnostics]
             named = None
         yield named or street()

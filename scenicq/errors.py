@@ -69,7 +69,7 @@ CODES: dict[str, str] = {
     "assumed": "the source leaves something open, and a usual value is taken for it",
     "not-read": "the source has something that a dataset cannot hold",
     "map-missing": "the labels refer to a map that is not there",
-    "map-does-not-fit": "vehicles are not on the lanes of a map or head across them, or left and right of lanes are swapped",
+    "map-does-not-fit": "vehicles are off the lanes of a map or head across them, or left and right are swapped",
     "map-invalid": "an element of a map is not sound",
     "store-missing": "the folder is not a dataset of ours",
     "store-version": "the dataset was written by another version",

@@ -101,7 +101,7 @@ def check_directions(objects: Iterable[ScenarioObject], requirements: Iterable[R
             if given is None or needed is None:
                 continue
             placed = given.explicit and given.span is not None
-            hints = ("`facing Range(0, 360) deg` asks nothing of the map",) if name == "heading" else ()
+            hints = ("`facing Range(0, 360) deg` needs nothing from the map",) if name == "heading" else ()
             raise fail(
                 "map-lacks", _NO_LANE.format(_named(needed)), given.span if placed else owner.span,
                 "needs lanes" if placed else f"the default {name} of `{owner.category}` needs lanes", hints,
@@ -111,7 +111,7 @@ def check_directions(objects: Iterable[ScenarioObject], requirements: Iterable[R
         needed = _needed_direction(requirement.condition) if requirement.built_in is None else None
         if needed is not None:
             raise fail("map-lacks", _NO_LANE.format(_named(needed)), needed.span or requirement.span, "needs lanes",
-                       ("leave out what the program asks of it",))  # fmt: skip
+                       ("leave out what needs it",))  # fmt: skip
 
 
 def check_enforced(scenario: Scenario, enforced: Collection[BuiltIn]) -> None:
@@ -134,7 +134,7 @@ def check_enforced(scenario: Scenario, enforced: Collection[BuiltIn]) -> None:
             raise fail(
                 "map-lacks", f"the map `{scenario.map}` has nothing for {list_names(names)}", owner.span,
                 f"`--enforce {kind.value}` wants `{owner.name}` inside",
-                ("without it nothing is asked of the map",),
+                ("without it the map is not needed",),
                 (Note(requirement.span, "the default"),) if requirement.span not in (None, owner.span) else (),
             )  # fmt: skip
 
@@ -144,7 +144,7 @@ def list_names(names: Iterable[str]) -> str:
     return " and ".join(f"`{name}`" for name in names) or "this"
 
 
-_NO_LANE = "the map has no lane that `{}` could be the direction of"
+_NO_LANE = "the map has no lane whose direction `{}` could be"
 
 
 def _fields(node: DirectionAt) -> list[Value]:

@@ -86,8 +86,8 @@ def attribute(run: Interpreter, value: ModelValue, name: str, span: Span) -> Mod
         return _of_choice(run, options, name, span)
     if found is MISSING:
         if value is None and is_of_elements(name):
-            raise fail("map-lacks", f"the map has no element here that `{name}` could be of", span, "this is of None",
-                       ("leave out with a condition where there is none",))  # fmt: skip
+            raise fail("map-lacks", f"the map has no element here, so there is no `{name}`", span, "this is of None",
+                       ("exclude places where there is none by a condition",))  # fmt: skip
         raise unknown_attribute(value, name, _names(run, value), _PLACES.get(name.lstrip("_"), ""), span)
     return found
 

@@ -30,7 +30,7 @@ __all__ = ["extreme", "language_names", "mathematics", "truth"]
 
 def _sequence(value: ModelValue, span: Span) -> list[ModelValue]:
     if is_random(value):
-        raise fail("random-branch", "a random list cannot be gone through", span, "random here",
+        raise fail("random-branch", "a program cannot loop over a random list", span, "random here",
                    ("use `Uniform(*list)` to pick one of its items",))  # fmt: skip
     if isinstance(value, list | tuple | set | range | dict | str):
         return list(cast("list[ModelValue]", value))
@@ -235,7 +235,7 @@ def _length(values: Any) -> int:
 
 def _whole_numbers(span: Span, *args: ModelValue) -> ModelValue:
     if any(is_random(arg) for arg in args):
-        raise fail("random-branch", "how often a loop runs must be known", span, "random here",
+        raise fail("random-branch", "a loop must run a known number of times", span, "random here",
                    ("write one program per number of objects",))  # fmt: skip
     if any(not isinstance(arg, int) for arg in args):
         raise fail("wrong-type", "`range` needs whole numbers", span)

@@ -148,7 +148,7 @@ def _compare_values(op: str, left: ModelValue, right: ModelValue, span: Span) ->
         if isinstance(left, Instance) and isinstance(right, Instance) and (said := _at_a_side(span)):
             raise fail(
                 "wrong-type",
-                f"`{op}` asks whether two names are of one object",
+                f"`{op}` asks whether two names mean one object",
                 span,
                 f"this is {describe(right)}",
                 said,
@@ -243,10 +243,10 @@ def iterate(value: ModelValue, span: Span) -> list[ModelValue]:
         plain = all(isinstance(item, str | int | float) for item in items)
         return sorted(items, key=lambda item: (isinstance(item, str), item)) if plain else items
     if is_random(value):
-        raise fail("random-branch", "a random list cannot be gone through", span, "random here",
+        raise fail("random-branch", "a program cannot loop over a random list", span, "random here",
                    ("use `Uniform(*list)` to pick one of its items",))  # fmt: skip
     if isinstance(value, LabelObjects | OtherList):
         hint = "ask with `any(... for c in others(C))`, `all(...)`, `len([...])`, or `count(C)`"
-        what = "the other label objects cannot be gone through one by one"
+        what = "a program cannot loop over the other label objects"
         raise fail("unsupported-construct", what, span, "not a list", (hint,))
-    raise fail("wrong-type", f"{describe(value)} cannot be gone through", span, "not a list")
+    raise fail("wrong-type", f"a program cannot loop over {describe(value)}", span, "not a list")

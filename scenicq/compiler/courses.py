@@ -39,7 +39,7 @@ class Course:
         Raises:
             ScenarioError: random-branch, where the condition may take one course alone.
         """
-        raise _refused(span, "how often a loop runs must be known")
+        raise _refused(span, "a loop must run a known number of times")
 
 
 @dataclass(eq=False, slots=True)
@@ -66,7 +66,7 @@ class _Taken(Course):
         if number < len(self.given):
             before, outcome = self.given[number]
             if [leaf.identity for leaf in leaves(test)] != [leaf.identity for leaf in leaves(before)]:
-                raise _refused(span, "what is drawn here is drawn anew in each course")
+                raise _refused(span, "each course of the condition draws this again")
             test = before
         self.tests.append(test)
         self.outcomes.append(outcome)

@@ -152,7 +152,7 @@ def of_element(run: Interpreter, value: NetworkElement | Maneuver | Signal, name
     try:
         found: Any = getattr(value, name)
     except MissingElementError as error:
-        hints = (f"`_{name}` is None there: leave such elements out with a condition",)
+        hints = (f"`_{name}` is None there: exclude such elements by a condition",)
         raise fail("map-lacks", f"the map says that {error}", span, "not in this map", hints) from None
     if found is None and name == "centerline":
         raise fail("map-lacks", f"the map gives no centreline for {value.name}", span, "not in this map")  # type: ignore[union-attr]

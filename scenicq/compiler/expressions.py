@@ -306,7 +306,7 @@ def _attribute(run: Interpreter, value: ModelValue, node: ast.Attribute, scope: 
     if value is None and isinstance(node.value, ast.Attribute):
         owner, lacked = evaluate(run, node.value.value, scope), node.value.name
         if isinstance(owner, NetworkElement):
-            hints = (f"`{lacked}` is None there: leave such elements out with a condition",)
+            hints = (f"`{lacked}` is None there: exclude such elements by a condition",)
             raise fail("map-lacks", f"the map says that {owner.name} has no `{lacked}`", node.value.name_span,
                        "not in this map", hints)  # fmt: skip
     name = FIRST_NAMES.get(node.name, node.name) if run.version == 1 and isinstance(value, Instance) else node.name

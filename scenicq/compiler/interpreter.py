@@ -370,7 +370,7 @@ class Interpreter:
                 record_statement(self, node, scope)
             case ast.DynamicDefinition(kind="scenario"):
                 if lines := beside_blocks(node.body):
-                    raise fail("parse-error", "a scenario with blocks has nothing else", lines[0].span,
+                    raise fail("parse-error", "a scenario with blocks cannot have other statements", lines[0].span,
                                "beside the blocks", ("write it in the `setup` block",))  # fmt: skip
                 made = self.make_function(node.name, node.parameters, node.body, scope, node.span)
                 scope.set(

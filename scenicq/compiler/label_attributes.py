@@ -40,7 +40,7 @@ def label_attribute(run: Interpreter, value: Instance, name: str, span: Span) ->
     if types is None:
         return MISSING
     if run.course is None:
-        raise fail("unsupported-construct", f"`{name}` is what labels say, which conditions alone can read", span,
+        raise fail("unsupported-construct", f"labels give `{name}`, so only conditions can read it", span,
                    "not in a condition", ("read it in `require`, `terminate when`, a monitor, or `record` it",
                                           f"`with {name} VALUE` compares it"))  # fmt: skip
     # what is of several kinds is only ever compared for equality

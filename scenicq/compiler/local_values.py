@@ -274,7 +274,7 @@ class LocalValues:
                 return transform(cast(Node, each), step)
             if any(step(node) is not node for node in postorder(self.nodes(each))):
                 return NoValue(fail("unsupported-construct", "this cannot be read at a later sample", _place(each),
-                                    "says what was there", ("say it anew where it is read",)))  # fmt: skip
+                                    "says what was there", ("write it again where it is read",)))  # fmt: skip
             return each
 
         def inner(each: ModelValue) -> ModelValue:

@@ -310,7 +310,7 @@ def existing(value: ModelValue, span: Span | None) -> Node:
     return area
 
 
-_ELSEWHERE = ("the map of another dataset may have it", "leave out what the program asks of it")
+_ELSEWHERE = ("the map of another dataset may have it", "leave out what needs it")
 
 
 def within(item: ModelValue, region: ModelValue, span: Span) -> Node:

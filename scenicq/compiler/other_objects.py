@@ -269,8 +269,8 @@ def _among(
     inputs = (*excluded, *given.values())
     chance = next((each for each in leaves(*inputs) if not isinstance(each, Index)), None)
     if chance is not None:
-        raise fail("unsupported-construct", "what is asked of other label objects hangs on a random value", span,
-                   "random here", ("ask it of what labels observe",))  # fmt: skip
+        raise fail("unsupported-construct", "a condition on other label objects depends on a random value", span,
+                   "random here", ("compare only with what labels observe",))  # fmt: skip
     kind = kind_of(value) if value is not None else "scalar" if op is AmongOp.COUNT else "boolean"
     return Among(op, objects.cls.category, body, kind, 1, len(excluded), inputs, span=span)
 
@@ -288,7 +288,7 @@ def _closed(root: Node, element: int, given: dict[int, Node], span: Span) -> Nod
         if id(node) in depends or isinstance(node, Constant):
             return made.get(id(node), node)
         if isinstance(node, Index):
-            raise fail("unsupported-construct", "which of several lanes other label objects are in cannot be asked",
+            raise fail("unsupported-construct", "a condition cannot ask which of several lanes other label objects are in",
                        span, "at their places", ("ask whether they are in a region",))  # fmt: skip
         given.setdefault(id(node), node)
         number = list(given).index(id(node))
@@ -301,7 +301,9 @@ def _closed(root: Node, element: int, given: dict[int, Node], span: Span) -> Nod
         elif any(id(each) in depends for each in below):
             if isinstance(node, DirectionAt) or is_leaf(node):
                 what = "a direction" if isinstance(node, DirectionAt) else "a random value"
-                raise fail("unsupported-construct", f"{what} at the place of other label objects cannot be asked", span)
+                raise fail(
+                    "unsupported-construct", f"a condition cannot ask for {what} where other label objects are", span
+                )
             made[id(node)] = rebuild(node, tuple(map(part, below)))
         else:
             continue

@@ -658,7 +658,7 @@ class ProcessGraph:
                 return replace(state, frames=state.frames[: number + keep])
             if isinstance(frame, CallFrame):
                 break
-        raise fail("parse-error", f"`{span.text.split()[0]}` stands outside of what it leaves", span, "leaves nothing")
+        raise fail("parse-error", f"`{span.text.split()[0]}` has nothing to leave here", span, "leaves nothing")
 
     def take(self, state: ProcessState, node: ast.Take, rest: ProcessState) -> Following:
         """Take actions."""

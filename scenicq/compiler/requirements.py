@@ -42,7 +42,7 @@ def requirement(run: Interpreter, node: ast.Require, scope: Environment) -> Requ
     wanted = node.condition
     if is_temporal(wanted) and node.probability is not None and probability != 1:
         raise fail("wrong-value", "a requirement with operators of time has no probability", node.probability.span,
-                   "only 1 can stand here", ("leave the probability out",))  # fmt: skip
+                   "only 1 is allowed here", ("leave the probability out",))  # fmt: skip
     if run.timed is not None and is_temporal(wanted):
         run.timed.require(lambda expression: defer(run, expression, scope, node.span), wanted, node.span)
         return None

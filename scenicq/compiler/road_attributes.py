@@ -257,7 +257,7 @@ def computed_attribute(
             return (build.constant(found, span) if isinstance(found, Region) else cast(ModelValue, found),)
     if name in _UNKNOWN and isinstance(value, _UNKNOWN[name][0]):
         raise fail("map-lacks", f"the map does not say {_UNKNOWN[name][1]}", span, "not in this map",
-                   ("leave out what the program asks of it",))  # fmt: skip
+                   ("leave out what needs it",))  # fmt: skip
     if name in _REFUSED and isinstance(value, _REFUSED[name][0]):
         raise fail("unsupported-construct", f"`{name}` is not supported here", span, "of a whole road",
                    (_REFUSED[name][1],))  # fmt: skip

@@ -64,7 +64,7 @@ def sequence_functions(run: Interpreter) -> dict[str, ModelValue]:
             return numbers[::-1] if backwards else numbers
         if random and run.course is None:
             raise fail("random-branch", "random values have no known order", span, "random here",
-                       ("sort by something known", "state conditions with `require`"))  # fmt: skip
+                       ("sort by a known value", "state conditions with `require`"))  # fmt: skip
 
         def before(a: tuple[ModelValue, ModelValue], b: tuple[ModelValue, ModelValue]) -> int:
             # all that sorting asks
@@ -100,7 +100,7 @@ def sequence_functions(run: Interpreter) -> dict[str, ModelValue]:
             keys = [_plain(as_constant(run, apply(key, value, span))) for value in values]
             if run.course is None and any(map(is_random, keys)):
                 raise fail("random-branch", "random values have no known order", span, "random here",
-                           ("compare by something known", "state conditions with `require`"))  # fmt: skip
+                           ("compare by a known value", "state conditions with `require`"))  # fmt: skip
             best = 0
             for number in range(1, len(values)):
                 one, other = (number, best) if name == "min" else (best, number)

@@ -165,7 +165,9 @@ def _by_default(error: ScenarioError, instance: Instance, name: str) -> Scenario
         if each.code == "map-lacks":
             notes = (*each.notes, Note(each.span, "the default")) if each.span is not None else each.notes
             label = f"the default `{name}` of `{instance.cls.name}` needs it"
-            anything = f"`{_FREELY[name]}` asks nothing of the map" if name in _FREELY else f"`with {name} ...` sets it"
+            anything = (
+                f"`{_FREELY[name]}` needs nothing from the map" if name in _FREELY else f"`with {name} ...` sets it"
+            )
             each = replace(each, span=instance.span, label=label, hints=(anything,), notes=notes)  # noqa: PLW2901
         told.append(each)
     return ScenarioError(told)

@@ -45,8 +45,8 @@ _NAMES: dict[str, tuple[str, ...]] = {
     ),
     "objects vehicles cars pedestrians others agents actors": (
         "a program names the objects that it asks for",
-        "`new Vehicle` asks for one vehicle, which every requirement may speak of",
-        "that there are no others can only be asked of all together, with `--exact`",
+        "`new Vehicle` asks for one vehicle, which requirements can name",
+        "`--exact` asks that no other objects are there",
     ),
     "divmod iter next slice ord chr bin hex oct ascii repr format bytes bytearray complex property staticmethod "
     "classmethod": (
@@ -95,8 +95,8 @@ _OF_SIGNS = "labels of signs are of class `Prop`"
 _BY_NAME = {
     "Sign": _OF_SIGNS, "StopSign": _OF_SIGNS, "TrafficSign": _OF_SIGNS,
     "distance": "`distance from a to b` has no brackets", "dist": "`distance from a to b` is the distance",
-    "angle": "`angle from a to b` has no brackets", "velocity": "`X.velocity` is that of an object X",
-    "speed": "`X.speed` is that of an object X", "heading": "`X.heading` is that of an object X",
+    "angle": "`angle from a to b` has no brackets", "velocity": "`X.velocity` is the velocity of an object X",
+    "speed": "`X.speed` is the speed of an object X", "heading": "`X.heading` is the heading of an object X",
     **dict.fromkeys(("parked", "stopped"), STANDING_HINT), "moving": MOVING_HINT, "turning": TURNING_HINT,
     "bikeLane": BIKE_LANES_HINT,
     "oncoming": "`facing Range(160, 200) deg relative to ego.heading`",
@@ -110,14 +110,14 @@ _BY_NAME = {
     "Weather": "`param weather = 'rain'` compares what labels say of the weather",
     **{name: f"`on {region}` places an object there" for name, region in _OF_MAP.items()},
     **{name: f"a direction is an angle, to the left of north: `{angle} deg`" for name, angle in _COMPASS.items()},
-    "self": "`self` stands in classes alone; `require` after the object asks of it by its name",
+    "self": "`self` is for classes; a `require` after the object uses the object's name",
 }  # fmt: skip
 """How the driving model says what people say with another name."""
 _BESIDE = re.compile(
     r"(?i)_?(left|right)_?(lane|neighbou?r)?|(lane|neighbou?r)_?(to_?)?(left|right)|laneTo(Left|Right)"
 )
 """What people call the lane beside another."""
-_RATE = "`angularSpeed` is how fast it turns, in radians a second"
+_RATE = "`angularSpeed` is the rate at which it turns, in radians a second"
 _BY_ATTRIBUTE = {
     "yawrate": _RATE, "angularvelocity": _RATE, "turnrate": _RATE, "accel": "`acceleration` is along the course",
     **dict.fromkeys(("isparked", "parked", "isstopped", "stopped", "isstationary"), STANDING_HINT),
@@ -191,7 +191,7 @@ def unknown_attribute(value: ModelValue, name: str, known: set[str], place: str,
     if is_thing and (said := _BY_ATTRIBUTE.get(name.replace("_", "").lower())):
         hints = (said,)
     if is_thing and not hints:
-        hints = (f"`{name}` can be read where labels of a dataset have it, which `scenicq check` is given, too",)
+        hints = (f"`{name}` can be read if labels of the dataset have it: give `scenicq check` the dataset, too",)
     if owner := _OWNER.search(span.source.text, 0, span.start):
         label = f"`{owner[1]}` is {shown}"
     return fail("unknown-attribute", message, span, label, hints)

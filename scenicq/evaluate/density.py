@@ -293,7 +293,7 @@ class GroupDensity:
         every = [self._roots.get(id(each), each.expression) for each in self.group.constraints]
         parents = [node for node in postorder(every) if any(child is index for child in children(node))]
         if parents != [choice] or [n for n in postorder(every) if choice in children(n)] != [leaf]:
-            raise CannotEvaluate("a region that other features hang on, too")
+            raise CannotEvaluate("a region on which other features depend, too")
         total = sum(index.weights)
         return tuple((weight / total, option) for weight, option in zip(index.weights, choice.options, strict=True))
 

@@ -178,7 +178,7 @@ def point_density(region: Data, point: Vectors) -> Array:
         return np.where(distances(region, *point) <= SLACK, 1 / _area(region), 0.0)
     only = region.options[0] if isinstance(region, Coded) and len(region.options) == 1 else None
     if not isinstance(only, Region):
-        raise CannotEvaluate("a point of what is no region")
+        raise CannotEvaluate("a random point in something that is not a region")
     measured = area(only)
     if not measured:
         raise CannotEvaluate("a point of a region without an area")

@@ -194,7 +194,7 @@ def concatenate(columns: Sequence[Column]) -> Column:
     numbers = [each.data for each in columns if isinstance(each.data, np.ndarray)]
     if len(numbers) == len(columns):
         return Column(whole(numbers), status)
-    raise CannotEvaluate("what is asked of the nearest is of several kinds")
+    raise CannotEvaluate("the value asked of the nearest object has several types")
 
 
 def take_rows(column: Column, rows: NDArray[np.intp], n: int) -> Column:
@@ -218,7 +218,7 @@ def take_rows(column: Column, rows: NDArray[np.intp], n: int) -> Column:
 
 
 def _drawn(_leaf: Leaf, _args: Sequence[Column]) -> Column:
-    raise CannotEvaluate("what is asked of label objects hangs on a random value")
+    raise CannotEvaluate("a condition on label objects depends on a random value")
 
 
 @lru_cache(maxsize=256)
