@@ -60,7 +60,9 @@ def networks_of(
     if dataset is not None and map_file is not None:
         hint = "give one of them"
         raise DataError(
-            Diagnostic("option-invalid", "a dataset brings its own maps: `--map` is too much", hints=(hint,))
+            Diagnostic(
+                "option-invalid", "`--map` is for checks without a dataset, which has maps of its own", hints=(hint,)
+            )
         )
     if dataset is not None:
         opened = open_checked(dataset)
@@ -131,8 +133,8 @@ class _Drawing:
             DataError: option-invalid.
         """
         if self.file.suffix.lower() != ".svg":
-            message = f"modes are drawn as SVG: {self.file} is no name for that"
-            raise DataError(Diagnostic("option-invalid", message, hints=("name a file as modes.svg",)))
+            message = f"modes are drawn as SVG, and the name {self.file} does not end in .svg"
+            raise DataError(Diagnostic("option-invalid", message, hints=("give a name such as modes.svg",)))
 
     def __call__(self, scenario: Scenario) -> list[str]:
         """Draw, and say nothing.

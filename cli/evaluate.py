@@ -57,10 +57,10 @@ _EXTENSIONS = {".json": "json"}
     cls=Manual,
     arguments={
         "RESULTS...": "Programs (.scenic), which are matched, or files that `match -o` wrote, one a scenario: .jsonl, "
-        ".csv or .parquet. Frames of which they do not say whether they match (--limit, --sample, --deadline) are left "
-        "out. With `match --all-matches` all who can play a role are known; else nobody else of a frame that matches "
-        "is compared.",
-        "DATASET": "The dataset that they are of.",
+        ".csv or .parquet. Frames that the results leave undecided (--limit, --sample, --deadline) are left out. "
+        "Results of `match --all-matches` name every object that can play a role; with other results, the further "
+        "objects of a frame that matches are not compared.",
+        "DATASET": "The dataset of the results.",
     },
     topics=by_topic(EVALUATION_OPTIONS, {
         "What counts": {"predictions"},

@@ -37,10 +37,10 @@ __all__ = ["explain"]
     arguments={
         "SCENARIO": SCENARIO,
         "DATASET": "A folder that `scenicq ingest` made.",
-        "FRAME": "The name of a frame, as `scenicq match` prints it, or as much of it as no other frame has; of a "
-        "program about what happens over time the frame in which the interval begins, or the name of a recording, and "
-        "after `@` when the interval begins: a timestamp, or the seconds from where the recording begins (`@3.5s`). "
-        "Intervals in which a frame lies without being their first are named, too.",
+        "FRAME": "The name of a frame as `scenicq match` prints it, or a part of it that no other frame has. For a "
+        "program about time: the first frame of the interval, or RECORDING, or RECORDING@TIME for the interval that "
+        "begins then (a timestamp, or seconds from the start of the recording, as in `@3.5s`). Intervals that begin earlier "
+        "and contain the frame are named, too.",
     },
     exits={
         0: "the frame or recording matches",

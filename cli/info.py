@@ -85,12 +85,12 @@ def _questions(dataset: Dataset, observed: ObservedMotion) -> list[str]:
     if observed.steps is None:
         over_time = "no, as no recording has two labels"
     elif not manifest.tracks:
-        over_time = "of the ego alone, as objects have no tracks"
+        over_time = "for the ego alone, as objects have no tracks"
     else:
         over_time = f"yes, by {count(manifest.tracks, 'track')}"
     roads = f"yes, {count(rows['lanes'], 'lane')}" if rows["lanes"] else "no, as there is no map with lanes"
     if rows["lanes"] and without_map:
-        roads += f"; not on {', '.join(without_map)}, of which there is no map"
+        roads += f"; not for {', '.join(without_map)}, which have no map"
     known = observed.known.get("velocity of objects")
     share = (known.own + known.derived) / known.total if known is not None and known.total else 0.0
     told = [

@@ -61,9 +61,9 @@ def sample(ctx: click.Context, scenario: str | None, dataset: str | None, *, pro
            output: AnyPath | None) -> None:  # fmt: skip
     """Draw scenes from a scenario, as labels.
 
-    They have the distribution of the program, given that all requirements hold, those that Scenic adds included. On
-    the first map of the dataset, the map that is given, the one that the program names with `param map =
-    localPath('FILE')`, or else a small built-in street. One line of JSON a scene.
+    Scenes have the distribution of the program, given that all requirements hold, also those that Scenic adds. They
+    lie on the first map of the dataset, or on the map that is given, or on the one that the program names with `param
+    map = localPath('FILE')`, or else on a small built-in street. Each is a line of JSON.
     """
     source, (target,), model = given_program(ctx, program, (scenario, dataset))
     read = read_values(QUERY_OPTIONS, {"scenic": scenic, "params": params})

@@ -288,7 +288,7 @@ def _closed(root: Node, element: int, given: dict[int, Node], span: Span) -> Nod
         if id(node) in depends or isinstance(node, Constant):
             return made.get(id(node), node)
         if isinstance(node, Index):
-            raise fail("unsupported-construct", "a condition cannot ask which of several lanes other label objects are in",
+            raise fail("unsupported-construct", "a condition cannot ask which lanes other label objects are in",
                        span, "at their places", ("ask whether they are in a region",))  # fmt: skip
         given.setdefault(id(node), node)
         number = list(given).index(id(node))

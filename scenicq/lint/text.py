@@ -241,7 +241,7 @@ def _exact(node: ast.SyntaxNode) -> Iterator[Diagnostic]:
             within = "5 deg" if is_angle(measured) else "0.5"
             yield make_warning(
                 "exact-number", f"`== {asked.span.text}` will almost never hold: measurements are not exact",
-                node.span, "no tolerance holds in requirements",
+                node.span, "tolerances do not apply in requirements",
                 f"`abs({near}) < {within}` asks for what is near it",
             )  # fmt: skip
 
