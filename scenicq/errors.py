@@ -102,6 +102,7 @@ CODES: dict[str, str] = {
     "solver-failed": "the solver cannot be started",
     # the answers
     "frame-excluded": "a frame shows something that the program does not allow",
+    "frame-undecided": "nothing decides whether a frame shows what the program allows",
     "unseen-action": "no recording can show an action or behavior",
     "never-compared": "the program sets a property that no label of the dataset has",
     "class-absent": "the program has a role for a class that no label object of the dataset has",

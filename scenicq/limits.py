@@ -25,7 +25,7 @@ class Beyond(Enum):
     REFUSED = "refused"
     OTHERWISE = "another way gives the same answer"
     COARSER = "less is known, which leaves more to other ways, or unknown"
-    SHORTER = "people are told less"
+    SHORTER = "less is reported"
 
 
 @dataclass(frozen=True, slots=True)

@@ -88,23 +88,21 @@ class Matcher:
         return next(self._decided([(label, candidates)], MapLookups(), reporter, fixed_roles or {}))
 
     def match_all(self, labels: Sequence[LabelAndCandidates], *, details: bool = True) -> Iterator[Verdict]:
-        """Decide labels, each as `match` does; without details only which constraint fails is reported of a no."""
+        """Decide labels, each as `match` does; without details, a no says only which constraint fails."""
         lookups = look_up_positions(self.plans.plans.values(), self.scenario.ego, labels)
         return self._decided(labels, lookups, None, {}, details=details)
 
     def matches(self, label: Label, *, candidates: Candidates | None = None) -> Iterator[Match]:
-        """Correspondences by which a label matches; of interchangeable objects, one order only."""
+        """The correspondences by which a label matches; interchangeable objects come in one order only."""
         found = (finding.verdict for finding in self.findings(label, candidates=candidates))
         return (verdict for verdict in found if isinstance(verdict, Match))
 
     def findings(
         self, label: Label, *, candidates: Candidates | None = None, every_open: bool = False
     ) -> Iterator[Finding]:
-        """The matches, then what is undecided, each or (also whether there are more) one; else what `examine` gives."""
-        found, time_for_all = (
-            self._findings((label, candidates), every_open=every_open),
-            limited(self.options.timeout_s),
-        )
+        """The matches, then one undecided correspondence, or every one; if there is neither, what `examine` gives."""
+        found = self._findings((label, candidates), every_open=every_open)
+        time_for_all = limited(self.options.timeout_s)
         while True:
             with time_for_all:
                 if (finding := next(found, None)) is None:
@@ -149,15 +147,10 @@ class Matcher:
             yield verdict
 
     def _findings(
-        self,
-        task: LabelAndCandidates,
-        lookups: MapLookups | None = None,
-        reporter: Reporter | None = None,
-        fixed_roles: Mapping[str, str] | None = None,
-        *,
-        every_open: bool = False,
-    ) -> Iterator[Finding]:
-        """Matches and what else is undecided, or else the one verdict that there is (algorithm 1)."""
+        self, task: LabelAndCandidates, lookups: MapLookups | None = None, reporter: Reporter | None = None,
+        fixed_roles: Mapping[str, str] | None = None, *, every_open: bool = False,
+    ) -> Iterator[Finding]:  # fmt: skip
+        """Algorithm 1: the matches, then what is undecided; if there is neither, the one verdict that outweighs."""
         (label, candidates), reported, rest = task, 0, list[tuple[int, Finding]]()
         for ego in possible_egos(self.scenario, label, self.options):
             roles = prepare_label(self.scenario, label, ego, self.options, fixed_roles or {}, candidates)

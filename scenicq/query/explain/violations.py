@@ -40,19 +40,21 @@ _FINEST = 1e-4
 
 @dataclass(frozen=True, slots=True)
 class Violation:
-    """A constraint that a correspondence breaks.
+    """A constraint that a correspondence breaks, or of which it is not known whether it does.
 
     Attributes:
         what: The feature or requirement, in the words of the program.
         value: What the label has, such as "is 137.2 deg".
-        allowed: What was allowed, and how far off the value is.
+        allowed: What was allowed, and how far off the value is; of what is not decided, what is missing.
         span: Where the program says it.
+        reason: Why it is not decided, as `Unknown.reason`; empty where it is broken.
     """
 
     what: str
     value: str
     allowed: str
     span: Span | None
+    reason: str = ""
 
 
 def violations(

@@ -9,13 +9,14 @@ import pytest
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import Source
 from scenicq.geometry.default_street import street
+from scenicq.limits import Beyond, Limits
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.evaluation import show_value
 from scenicq.match.tolerance import EXACT, Tolerance, parse_tolerance
-from scenicq.match.verdict import Match, NoMatch
+from scenicq.match.verdict import Match, NoMatch, Unknown
 from scenicq.query.explain.changes import show_tolerance
-from scenicq.query.explain.frame_explanation import explain, show_explanation
+from scenicq.query.explain.frame_explanation import REASONS, explain, show_explanation
 from scenicq.query.explain.nearest_miss import closest, narrow_advice, widen_tolerance
 from scenicq.store.labels import Label, LabelObject
 
@@ -85,6 +86,25 @@ def test_a_requirement_shows_both_sides_and_no_tolerance_helps():
     (violation,) = found.violations
     assert violation.allowed == "30 m < 20 m is false"
     assert "no tolerance would make it match" in show_explanation(found)
+
+
+def test_what_a_label_does_not_tell_is_undecided_and_not_excluded():
+    found = explain(matcher(TEXT + "require other.speed > 1\n"), frame(car("a", 1.75, 60.0)))
+    assert isinstance(found.verdict, Unknown)
+    (violation,) = found.violations
+    assert violation.reason == found.verdict.reason == "unobserved"
+    text = show_explanation(found)
+    assert text.startswith("frame f1 is undecided: unobserved\n")
+    assert "undecided[frame-undecided]: " in text
+    assert "is not decided: the label does not tell what the program asks" in text
+    assert "other.speed is not observed" in text
+    assert "excluded" not in text
+
+
+def test_each_reason_of_a_limit_is_said_in_words():
+    limits = Limits.__dataclass_fields__.values()
+    reasons = {each.metadata["more"] for each in limits if each.metadata["beyond"] is Beyond.UNDECIDED}
+    assert {each for each in reasons if " " not in each} <= REASONS.keys()
 
 
 def test_a_missing_class_is_said():
