@@ -39,8 +39,8 @@ __all__ = ["explain"]
         "DATASET": "A folder that `scenicq ingest` made.",
         "FRAME": "The name of a frame as `scenicq match` prints it, or a part of it that no other frame has. For a "
         "program about time: the first frame of the interval, or RECORDING, or RECORDING@TIME for the interval that "
-        "begins then (a timestamp, or seconds from the start of the recording, as in `@3.5s`). Intervals that begin earlier "
-        "and contain the frame are named, too.",
+        "begins then (a timestamp, or seconds from the start of the recording, as in `@3.5s`). Intervals that begin "
+        "earlier and contain the frame are named, too.",
     },
     exits={
         0: "the frame or recording matches",

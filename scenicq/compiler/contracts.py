@@ -347,13 +347,13 @@ class _Motion:
                 raise self.wrong(option, f"`{name}` is a lane of the map")
             return lane_course(self.run, option, self.span, against=against)
 
-        return self.each(lane, area)
+        return self.map_outcomes(lane, area)
 
-    def each(self, value: ModelValue, make: Callable[[ModelValue], Region]) -> Node:
+    def map_outcomes(self, value: ModelValue, make: Callable[[ModelValue], Region]) -> Node:
         """What is made of a value, or of each outcome of a choice; where there is no element, there is no region."""
         if isinstance(value, Choice):
             nothing = build.constant(Undefined("there is no such element here"), self.span)
-            options = (nothing if each is None else self.each(each, make) for each in value.options)
+            options = (nothing if each is None else self.map_outcomes(each, make) for each in value.options)
             return Select(value.index, tuple(options), span=self.span)
         return build.constant(make(value), self.span)
 
@@ -376,7 +376,7 @@ class _Motion:
             lane = option.lane if isinstance(option, LaneSection) else option
             return lanes_and_junctions((lane,), lane.name)
 
-        parts = tuple(self.each(each, area) for each in lanes)
+        parts = tuple(self.map_outcomes(each, area) for each in lanes)
         return parts[0] if len(parts) == 1 else fold(RegionUnion(parts, span=self.span))
 
     def behind(self, lane: ModelValue, name: str) -> Node:
@@ -393,7 +393,7 @@ class _Motion:
             x, y = option.centerline.lines[-1].coords[-1][:2]
             return PointSet(((x, y),), f"the end of {option.name}")
 
-        return self.each(lane, target)
+        return self.map_outcomes(lane, target)
 
 
 # --- actions
@@ -664,7 +664,7 @@ def _change_lane(
         motion.within(motion.run.network.drivableRegion, _bound("lane")),
         motion.approaches(motion.number(target_speed, "target_speed")),
     )
-    middle = motion.within(motion.each(laneSectionToSwitch, line), _bound("arrived"))
+    middle = motion.within(motion.map_outcomes(laneSectionToSwitch, line), _bound("arrived"))
     return Contract(
         motion.name, shows, settles_s=_bound("lane window"), over=middle,
         shows_from=lambda place: _either(new, from_old(place)),

@@ -93,7 +93,7 @@ class Exclusions:
         level.setdefault(key, _Choice(index, count, span)).excluded.update(options)
 
     @contextmanager
-    def apart(self) -> Generator[list[_Told]]:
+    def collect_separately(self) -> Generator[list[_Told]]:
         """What is excluded meanwhile is only listed."""
         before, found = self._apart, list[_Told]()
         self._apart = found

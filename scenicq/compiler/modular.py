@@ -128,7 +128,7 @@ def set_up(run: Interpreter, call: CoroutineCall, ego: Instance | None) -> SetUp
     assert run.timed is not None
     definition = cast(ScenarioDefinition, call.of)
     scope, first = _scope(call), len(run.objects)
-    timed = run.timed.apart()
+    timed = run.timed.for_inner_run()
     params, records = dict(run.params), list(run.records)
     with _within(run, timed, ego) as requirements, read_over_time(current=False):
         _, excluded = collect_exclusions(run, lambda: run.run(definition.setup, scope))

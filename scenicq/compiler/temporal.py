@@ -147,7 +147,7 @@ class TimedStatements:
         self.conditions.append(condition)
         return Atom(len(self.conditions) - 1)
 
-    def apart(self) -> TimedStatements:
+    def for_inner_run(self) -> TimedStatements:
         """What takes what a scenario says that begins within a run."""
         return TimedStatements(self.behaviors, self.reaction_s, actions=self.actions)
 

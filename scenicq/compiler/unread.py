@@ -43,7 +43,7 @@ def evaluate_when_read(
     """
     if not _is_pure(node, scope):
         return compute()
-    with run.excluded.apart() as found:
+    with run.excluded.collect_separately() as found:
         try:
             value: ModelValue = compute()
         except ScenarioError as error:

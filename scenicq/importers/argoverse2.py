@@ -68,7 +68,7 @@ class Argoverse2:
             raise missing(path, "no log with `annotations.feather`")
         beside = {folder for above in {log.parent for log in logs if log != path} for folder in above.iterdir()}
         bare = [folder for folder in beside - {*logs} if (folder / _POSES).is_file()]
-        report.not_read(f"log without {_BOXES}", len(bare))
+        report.count_unread(f"log without {_BOXES}", len(bare))
         maps = read_maps(options.maps, report)
         for log in logs:
             if (file := archive_of(log / "map")) is not None:
@@ -139,7 +139,7 @@ class _Log:
             try:
                 self._add({key: values[number] for key, values in rows.items()})
             except InvalidError as error:
-                report.left_out("object", "record-invalid", f"{log.name}/{_BOXES}:{number + 1}: {error}")
+                report.leave_out("object", "record-invalid", f"{log.name}/{_BOXES}:{number + 1}: {error}")
 
     def labels(self) -> list[Label]:
         times = sorted(self._poses)
@@ -201,10 +201,10 @@ class _Log:
                     poses[time] = _pose({key: values[number] for key, values in rows.items()})
                 except InvalidError as error:
                     place = f"{self._log.name}/{_POSES}:{number + 1}"
-                    self._report.left_out("ego pose", "record-invalid", f"{place}: {error}")
+                    self._report.leave_out("ego pose", "record-invalid", f"{place}: {error}")
         for time in sorted(wanted - set(poses)):
             message = f"{self._log.name}: annotations at {time} have no sound pose of the ego"
-            self._report.left_out("label", "record-invalid", message)
+            self._report.leave_out("label", "record-invalid", message)
         return poses
 
     def _add(self, row: Mapping[str, Any]) -> None:

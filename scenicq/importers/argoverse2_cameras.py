@@ -43,7 +43,7 @@ def views_of(log: Path, times: Sequence[int], images: Images, report: Report) ->
     """
 
     def tell(problem: str) -> None:
-        report.left_out("camera", "record-invalid", f"{log.name}/{problem}")
+        report.leave_out("camera", "record-invalid", f"{log.name}/{problem}")
 
     views: dict[int, dict[str, Camera]] = {time: {} for time in times}
     mounts = _mounts(calibration_of(log), tell, report) if any(images.values()) else {}

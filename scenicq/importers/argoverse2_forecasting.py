@@ -88,7 +88,7 @@ def _read_scenario(place: RecordingFiles, classes: ClassNames, report: Report) -
                 raise InvalidError("`timestep` is missing")
             steps.setdefault(row["timestep"], []).append(_object(row, classes, report))
         except InvalidError as error:
-            report.left_out("object", "record-invalid", f"{file.name}:{number + 1}: {error}")
+            report.leave_out("object", "record-invalid", f"{file.name}:{number + 1}: {error}")
     if not steps:
         raise DataError(Diagnostic("file-invalid", f"{file} has no sound row"))
     params: dict[str, str | float | bool] = {"location": city} if (city := _only(rows, "city")) else {}
@@ -96,7 +96,7 @@ def _read_scenario(place: RecordingFiles, classes: ClassNames, report: Report) -
     for step in sorted(steps):
         ego = next((member for member in steps[step] if member.id == "ego"), None)
         if ego is None:
-            report.left_out("label", "record-invalid", f"{file.name}: step {step} has no track `{_EGO_TRACK}`")
+            report.leave_out("label", "record-invalid", f"{file.name}: step {step} has no track `{_EGO_TRACK}`")
             continue
         others = tuple(member for member in steps[step] if member is not ego)
         made.append(

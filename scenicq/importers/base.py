@@ -161,7 +161,7 @@ class ClassNames:
         near = similar(name.capitalize(), subclasses(ROOT))
         suggestion = f'"{near}"' if near else "CLASS"
         hint = f'a class map with {{"{name}": {suggestion}}} gives it a class: `--class-map FILE`'
-        self._report.kept("object", "unknown-class", message, name=name, hints=(hint,))
+        self._report.keep("object", "unknown-class", message, name=name, hints=(hint,))
         return ROOT
 
 
@@ -225,7 +225,7 @@ class LabelChecker:
                 times[time] = frame
                 order.append(number)
         if not order:
-            self._report.left_out("recording", "record-invalid", f"recording `{columns.name}` has no sound label")
+            self._report.leave_out("recording", "record-invalid", f"recording `{columns.name}` has no sound label")
             return None
         if columns.map not in self._maps:
             self._report_missing_map(columns.map, len(order))
@@ -239,15 +239,15 @@ class LabelChecker:
     def _report_missing_map(self, map_name: str, label_count: int) -> None:
         if map_name == NO_MAP:
             message = "labels have no map: no road, lane or direction of traffic is known for them"
-            self._report.assumed("map", "no map", message, hints=("`--map none=FILE.geojson` gives one",))
+            self._report.assume("map", "no map", message, hints=("`--map none=FILE.geojson` gives one",))
             return
         message = f"map `{map_name}` is not there; its labels are kept without a road network"
         hint = f"`--map {map_name}=FILE.geojson` gives the map"
         for _ in range(label_count):
-            self._report.kept("label", "map-missing", message, name=map_name, hints=(hint,))
+            self._report.keep("label", "map-missing", message, name=map_name, hints=(hint,))
 
     def _leave_out(self, message: str) -> None:
-        self._report.left_out("label", "record-invalid", message)
+        self._report.leave_out("label", "record-invalid", message)
 
     def _sound_rows(
         self, columns: RecordingColumns, problems: Problems, source_lines: Sequence[object], labels: Sequence[int]
@@ -267,12 +267,12 @@ class LabelChecker:
             if ambiguous or not problems.objects.keys().isdisjoint(range(first, end)):
                 for row, fact in _find_unsound(ids, tracks, range(first, end), owner, ego, problems.objects):
                     objects[row] = False
-                    self._report.left_out("object", "record-invalid", f"{source_lines[label]}: {fact}")
+                    self._report.leave_out("object", "record-invalid", f"{source_lines[label]}: {fact}")
             for row in range(sensor_ends[label] - int(columns.sensor_counts[label]), sensor_ends[label]):
                 if (problem := problems.sensors.get(row)) is not None:
                     sensors[row] = False
                     message = f"{source_lines[label]}: sensor file `{columns.channels[row]}` {owner}: {problem}"
-                    self._report.left_out("sensor file", "record-invalid", message)
+                    self._report.leave_out("sensor file", "record-invalid", message)
         return objects, sensors
 
 

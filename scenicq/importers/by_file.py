@@ -68,7 +68,7 @@ class FileReader:
                 made = self.make(place, classes, report)
             except DataError as error:
                 for diagnostic in error.diagnostics:
-                    report.left_out("recording", diagnostic.code, diagnostic.message, hints=diagnostic.hints)
+                    report.leave_out("recording", diagnostic.code, diagnostic.message, hints=diagnostic.hints)
                 continue
             tell_order(place.name, [label.timestamp_us for label, _ in made], report, numbered=True)
             if (recording := labels.check_labels(place.name, made)) is not None:
@@ -142,7 +142,7 @@ def map_sink(file: str, report: Report) -> ProblemSink:
     """Takes problems of a map; what dangles is kept, with a defect, as maps end somewhere."""
 
     def tell(element: str, problem: str) -> None:
-        add = report.kept if "is not in the map" in problem else report.left_out
+        add = report.keep if "is not in the map" in problem else report.leave_out
         add("map element", "map-invalid", f"{file}: element `{element}`: {problem}")
 
     return tell
@@ -170,7 +170,7 @@ def take_map(
         maps[name] = read(file, map_sink(file.name, report), report)
     except DataError as error:
         for diagnostic in error.diagnostics:
-            report.left_out("map", diagnostic.code, diagnostic.message)
+            report.leave_out("map", diagnostic.code, diagnostic.message)
 
 
 def missing(path: Path, what: str) -> DataError:

@@ -79,7 +79,7 @@ def _read_scenario(place: RecordingFiles, classes: ClassNames, report: Report) -
     load_specification("commonroad").count_xml(root, report)
     step_s = _step(root)
     if step_s is None:
-        report.left_out("recording", "record-invalid", f"{file.name}: `timeStepSize` is not a positive number")
+        report.leave_out("recording", "record-invalid", f"{file.name}: `timeStepSize` is not a positive number")
         return []
     moving: dict[int, list[LabelObject]] = {}
     standing: list[LabelObject] = []
@@ -90,11 +90,11 @@ def _read_scenario(place: RecordingFiles, classes: ClassNames, report: Report) -
             name, size = attribute(element, "id"), _size(element)
             states = element.findall("initialState") + element.findall("trajectory/state")
         except InvalidError as error:
-            report.left_out("track", "record-invalid", f"{where}: {error}")
+            report.leave_out("track", "record-invalid", f"{where}: {error}")
             continue
         if sets := element.findall("occupancySet/occupancy"):
             message = f"{where}: where it may be is known only as {len(sets)} areas; it is in no frame after the first"
-            report.left_out("object", "record-invalid", message)
+            report.leave_out("object", "record-invalid", message)
         for index, state in enumerate(states):
             try:
                 member = _object(name, kind, size, state, classes, report)
@@ -103,7 +103,7 @@ def _read_scenario(place: RecordingFiles, classes: ClassNames, report: Report) -
                     break
                 moving.setdefault(_time(state, index), []).append(member)
             except InvalidError as error:
-                report.left_out("object", "record-invalid", f"{where}: state {index}: {error}")
+                report.leave_out("object", "record-invalid", f"{where}: state {index}: {error}")
     params = _params(root)
     moments = [
         Moment(f"{place.name}/{step}", round(step * step_s * 1e6), (*moving.get(step, ()), *standing), params)

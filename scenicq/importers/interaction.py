@@ -64,7 +64,7 @@ class Interaction:
                 places += _places(file, path, scene, f"{scene}/{number}", choice, report)
             except DataError as error:
                 for diagnostic in error.diagnostics:
-                    report.left_out("recording", diagnostic.code, diagnostic.message)
+                    report.leave_out("recording", diagnostic.code, diagnostic.message)
         return by_file_source(
             f"interaction-{path.resolve().name}",
             maps,
@@ -124,7 +124,7 @@ def _read_tracks(place: RecordingFiles, classes: ClassNames, report: Report) -> 
                     raise InvalidError(f"frame {frame} has another time than before")
                 members.setdefault(frame, []).append(_object(row, classes, report))
             except InvalidError as error:
-                report.left_out("object", "record-invalid", f"{file.name}: {place.name}: row {number}: {error}")
+                report.leave_out("object", "record-invalid", f"{file.name}: {place.name}: row {number}: {error}")
     told = _apart(members, place.name, report)
     moments = [Moment(f"{place.name}/{frame}", times[frame] * 1000, tuple(told[frame])) for frame in sorted(members)]
     return with_egos(moments, choice or None, place.name, place.map, place.name, report)
@@ -138,7 +138,7 @@ def _apart(members: dict[int, list[LabelObject]], name: str, report: Report) -> 
         shared |= {key for key, count in Counter(key for key, _ in kinds).items() if count > 1}
     if not shared:
         return members
-    report.assumed(
+    report.assume(
         "recording", "people numbered apart",
         f"{name}: track {min(shared)} is a vehicle and a person at one time; such people are called `P` and the number",
     )  # fmt: skip

@@ -103,10 +103,10 @@ def _read_sequence(place: RecordingFiles, classes: ClassNames, report: Report) -
     if "calib" in extra:
         camera = _camera(extra["calib"], report)
     else:
-        report.kept("recording", "file-missing", f"{file.name}: no `calib`; the camera looks ahead from the ego")
+        report.keep("recording", "file-missing", f"{file.name}: no `calib`; the camera looks ahead from the ego")
     poses = _poses(extra["oxts"], report) if "oxts" in extra else None
     if poses is None:
-        report.kept("recording", "file-missing", f"{file.name}: no `oxts`; the ego stays at the origin")
+        report.keep("recording", "file-missing", f"{file.name}: no `oxts`; the ego stays at the origin")
     by_frame: defaultdict[int, list[LabelObject]] = defaultdict(list)
     for number, row in enumerate(_rows(file), start=1):
         where = f"{file.name}:{number}"
@@ -115,7 +115,7 @@ def _read_sequence(place: RecordingFiles, classes: ClassNames, report: Report) -
             if frame < 0 or frame > 1_000_000:
                 raise InvalidError("the frame is not a number")
             if len(row) > 2 and row[2] == "DontCare":
-                report.not_read(f"{_LABELS}/DontCare")
+                report.count_unread(f"{_LABELS}/DontCare")
                 continue
             _count_columns(_LABELS, _LABEL, len(row), report)
             if poses is not None and frame >= len(poses):
@@ -125,7 +125,7 @@ def _read_sequence(place: RecordingFiles, classes: ClassNames, report: Report) -
                 _object(row, (poses[frame].place if poses else ego).compose(camera), classes, report)
             )
         except InvalidError as error:
-            report.left_out("object", "record-invalid", f"{where}: {error}")
+            report.leave_out("object", "record-invalid", f"{where}: {error}")
     return _labels(place, by_frame, poses)
 
 

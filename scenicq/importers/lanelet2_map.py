@@ -100,7 +100,7 @@ def _count(root: Element, report: Report) -> None:
         if not known.count(path, report):
             continue
         if path == "relation/lanelet" and tags.get("one_way") == "no" and tags.get("subtype") not in _AREAS:
-            report.not_read('relation/lanelet/tag/one_way="no": the other direction')
+            report.count_unread('relation/lanelet/tag/one_way="no": the other direction')
         inner = [f"@{name}" for name in element.attrib]
         inner += [
             f"tag/{child.get('k')}"

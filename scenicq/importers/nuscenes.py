@@ -102,7 +102,7 @@ def _maps(
         from scenicq.importers.nuscenes_map import read_expansion  # noqa: PLC0415 - slow to load, and for maps
 
         def tell(element: str, problem: str, file: str = expansion.name) -> None:
-            report.left_out("map element", "map-invalid", f"{file}: element `{element}`: {problem}")
+            report.leave_out("map element", "map-invalid", f"{file}: element `{element}`: {problem}")
 
         maps[location] = read_expansion(expansion, tell, report, left_hand=location.startswith(_LEFT_HAND))
     return maps

@@ -159,7 +159,7 @@ class _Expansion:
         for name, key in (("predecessors", "incoming"), ("successors", "outgoing")):
             others: list[str] = self._try(token, lambda key=key: self._linked(token, key)) or []
             properties[name] = [other for other in others if other in self._lanes]
-            self._report.not_read(
+            self._report.count_unread(
                 f"connectivity/*/{key} of lanes that are not there", len(others) - len(properties[name])
             )
         return properties

@@ -114,7 +114,7 @@ class SceneReader:
             for instant in scene.instants:
                 if instant.pose is None:
                     message = f"{instant.place}: sample `{instant.token}` has no sound ego pose"
-                    report.left_out("label", "record-invalid", message)
+                    report.leave_out("label", "record-invalid", message)
             places = [instant.place for instant in scene.instants if instant.pose is not None]
             if (found := labels.check_columns(_columns(scene, classes), places)) is not None:
                 yield found

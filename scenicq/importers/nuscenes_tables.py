@@ -156,7 +156,7 @@ class Tables:
         """Microseconds; some datasets in this layout have shares of one."""
         if isinstance(row.timestamp, float) and not row.timestamp.is_integer() and abs(row.timestamp) <= _LARGEST_TIME:
             message = "times are no whole numbers of microseconds; they are rounded"
-            self._report.assumed("sample", "rounded times", message)
+            self._report.assume("sample", "rounded times", message)
             return round(row.timestamp)
         return whole(row.timestamp, "timestamp")
 
@@ -197,15 +197,15 @@ class Tables:
                     images[token].append(_Image(sample, sensor, width, height))
 
             self._try("sensor file", place, add, f"sample_data `{row.token}`")
-        self._report.not_read("sample_data/sweeps", sweeps)
-        self._report.not_read("sample_data of samples that are not there", strays)
+        self._report.count_unread("sample_data/sweeps", sweeps)
+        self._report.count_unread("sample_data of samples that are not there", strays)
         for sample, (_, _, token) in nearest.items():
             if sample not in pose_of:
                 pose_of[sample] = token
                 message = (
                     f"no sound key frame of {POSE_CHANNEL}: the ego is where it was at the key frame nearest in time"
                 )
-                self._report.assumed("sample", "ego pose", message)
+                self._report.assume("sample", "ego pose", message)
         wanted = {*pose_of.values(), *images}
         rows: list[tables.EgoPose] = []
         for row, place in self._rows(tables.EGO_POSES, "ego pose"):
@@ -269,7 +269,7 @@ class Tables:
         def tell(number: int, problem: str) -> None:
             place = _Place(file, block, numbers[number])
             message = f"{place}: annotation `{rows[number].token}`: {problem}"
-            self._report.left_out("object", "record-invalid", message)
+            self._report.leave_out("object", "record-invalid", message)
 
         return reader.boxes(rows, tell)
 
@@ -303,7 +303,7 @@ class Tables:
             except InvalidError as error:
                 name = f"{table.at} `{error.name}`: " if isinstance(error, RowError) and error.name else ""
                 name = name.replace("sample_annotation", "annotation")
-                self._report.left_out(what, "record-invalid", f"{_Place(file, block, number)}: {name}{error}")
+                self._report.leave_out(what, "record-invalid", f"{_Place(file, block, number)}: {name}{error}")
         return rows, numbers
 
     def _try(self, what: str, place: _Place, make: Callable[[], V], name: str = "") -> V | None:
@@ -311,7 +311,7 @@ class Tables:
             return make()
         except InvalidError as error:
             of = f"{name}: " if name else ""
-            self._report.left_out(what, "record-invalid", f"{place}: {of}{error}")
+            self._report.leave_out(what, "record-invalid", f"{place}: {of}{error}")
             return None
 
 

@@ -23,7 +23,7 @@ from scenicq.errors import DataError, Diagnostic
 from scenicq.garbage import pause_collector
 from scenicq.importers.base import LabelChecker, RecordingEntry, RecordingReader
 from scenicq.importers.recording_checks import tell_recording
-from scenicq.importers.report import MOST_TOLD, Report
+from scenicq.importers.report import MOST_MESSAGES, Report
 from scenicq.processes import Lost, Workers, default_processes
 from scenicq.store.schema import SCHEMA_VERSION, SEGMENT_TABLES, ArrowTable
 from scenicq.store.segment import MapIndexes, Segment, SegmentWriter, SourceRecording
@@ -228,7 +228,7 @@ def _write(world: World, job: Job, indexes: MapIndexes, on_recording: OnRecordin
                 for share, piece in zip(together, found, strict=True):
                     pieces[share.name] = piece
                     if messages.total() > _MOST_MESSAGES:
-                        few = tuple(each for each in piece.told if messages[each.what, each.code] < MOST_TOLD)
+                        few = tuple(each for each in piece.told if messages[each.what, each.code] < MOST_MESSAGES)
                         pieces[share.name] = structs.replace(piece, fingerprint="", told=few)
                     messages.update((each.what, each.code) for each in pieces[share.name].told)
             return writer.finish(job.fingerprint, pieces)
@@ -247,7 +247,7 @@ def _read(
         writer.add(found, indexes.of(found.map))
         on_recording(found.name, len(found.frames))
         maps[found.map] = world.digests.get(found.map, "")
-    return SourceRecording(share.fingerprint, report.tally, report.told, tuple(maps.items()))
+    return SourceRecording(share.fingerprint, report.tally, report.problems, tuple(maps.items()))
 
 
 def _copy(

@@ -75,7 +75,7 @@ class Specification:
         """
         status = self.status(path)
         if status == LEFT_OUT and count:
-            report.not_read(path, count)
+            report.count_unread(path, count)
         return status == READ
 
     def count_columns(self, table: str, columns: Iterable[str], report: Report, rows: int = 1) -> None:

@@ -66,7 +66,7 @@ class Waymo:
                 _list_scenarios(file, path, maps, places, report)
             except DataError as error:
                 for diagnostic in error.diagnostics:
-                    report.left_out("file", diagnostic.code, diagnostic.message)
+                    report.leave_out("file", diagnostic.code, diagnostic.message)
         return by_file_source(
             f"waymo-{path.resolve().name}",
             maps,
@@ -96,7 +96,7 @@ def _list_scenarios(
                 raise InvalidError(f"has the scenario `{name}` again")
         except InvalidError as error:
             hints = () if content is None else _other_messages(content)
-            report.left_out("recording", "record-invalid", f"{where}: {error}", hints=hints)
+            report.leave_out("recording", "record-invalid", f"{where}: {error}", hints=hints)
             continue
         digest = hashlib.blake2b(content, digest_size=16).hexdigest()
         weight = len(content) // _OBJECT_BYTES
@@ -107,7 +107,7 @@ def _list_scenarios(
             kinds = {feature.kind for feature in maps[name]}
             if "lane" in kinds and "intersection" not in kinds:
                 message = f"{file.name}: scenario {name}: no lane is `interpolating`: its map has no intersection"
-                report.assumed("map", "no intersections", message)
+                report.assume("map", "no intersections", message)
 
 
 def _other_messages(content: bytes) -> tuple[str, ...]:
@@ -127,7 +127,7 @@ def _read_scenario(place: RecordingFiles, classes: ClassNames, report: Report) -
         if not 0 <= ego_index < len(tracks):
             raise InvalidError("`sdc_track_index` names no track")
     except InvalidError as error:
-        report.left_out("recording", "record-invalid", f"{where}: {error}")
+        report.leave_out("recording", "record-invalid", f"{where}: {error}")
         return []
     load_specification("waymo").count_message(scenario, report)
     members: list[dict[int, LabelObject]] = []
@@ -137,13 +137,13 @@ def _read_scenario(place: RecordingFiles, classes: ClassNames, report: Report) -
                 raise InvalidError("it is not a message")
             members.append(_track(parse(value), number == ego_index, classes, report, f"{where}: track {number}"))
         except InvalidError as error:
-            report.left_out("track", "record-invalid", f"{where}: track {number}: {error}")
+            report.leave_out("track", "record-invalid", f"{where}: track {number}: {error}")
             members.append({})
     made: list[tuple[Label, str]] = []
     for step, time in enumerate(times):
         ego = members[ego_index].get(step)
         if ego is None:
-            report.left_out("label", "record-invalid", f"{where}: the ego is not valid at step {step}")
+            report.leave_out("label", "record-invalid", f"{where}: the ego is not valid at step {step}")
             continue
         others = tuple(track[step] for track in members if step in track and track[step] is not ego)
         frame = f"{place.name}/{step}"
@@ -170,7 +170,7 @@ def _track(track: Message, is_ego: bool, classes: ClassNames, report: Report, wh
             if any(at[key] <= 0 for key in ("length", "width", "height")):
                 raise InvalidError("its size is not positive")
         except InvalidError as error:
-            report.left_out("object", "record-invalid", f"{where}: step {step}: {error}")
+            report.leave_out("object", "record-invalid", f"{where}: step {step}: {error}")
             continue
         radians(at["heading"], report)
         found[step] = _object(name, source_class, is_ego, at, classes)

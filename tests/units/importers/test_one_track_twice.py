@@ -36,7 +36,7 @@ def test_every_importer_keeps_the_first_and_tells_of_the_others():
     recording = LabelChecker({STREET.name}, report).check_labels("r", [(LABEL, "source line 7")])
     assert recording is not None
     assert list(recording.objects.id) == ["a", "c", "d", "e"]
-    assert [each.message for each in report.told] == [
+    assert [each.message for each in report.problems] == [
         f"source line 7: object `{id_}` of label `f`: has the track `t` of object `a`, which is kept"
         for id_ in ("b", "g")
     ]
@@ -50,7 +50,7 @@ def test_an_object_with_the_ego_s_track_is_left_out():
     assert recording is not None
     assert list(recording.objects.id) == ["a", "d", "e"]
     assert "source line 7: object `c` of label `f`: has the track `u` of object `ego`, which is kept" in [
-        each.message for each in report.told
+        each.message for each in report.problems
     ]
 
 
