@@ -86,7 +86,7 @@ class Table:
         """The rows that are held back stay there."""
 
     def finish(self, summary: ResultSummary | None = None) -> None:
-        """Write the rows that are held back; a table is for people, whom standard error tells the rest."""
+        """Write the rows that are held back; the summary is not of the table: standard error has it for people."""
         if not self._rows:
             return
         lines = columns([_INTERVAL_HEAD if self._over_time else _HEAD, *self._rows], indent="")

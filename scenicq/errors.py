@@ -207,7 +207,7 @@ class Span:
 
     @property
     def mark(self) -> str:
-        """The same without the file's folder: what results call the place, wherever one stands."""
+        """`place` without the folder: how results name the place, whatever folder a command runs in."""
         line, column = self.source.position(self.start)
         return f"{self.source.file_name}:{line}:{column}"
 

@@ -46,7 +46,7 @@ Task = TypeVar("Task")
 Answer = TypeVar("Answer")
 
 Work = Callable[[Task, Callable[[Any], None]], Answer]
-"""Does a task in a worker; the second argument sends a value to whoever waits for the answer."""
+"""Does a task in a worker; the second argument sends a value to the process that waits for the answer."""
 
 _STARTS, _KILLED_STARTS = 3, 30
 """Processes in a row that may end before they have started: of those that end by themselves, and of those killed."""

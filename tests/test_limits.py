@@ -83,7 +83,7 @@ def test_each_limit_is_read_and_each_that_is_read_stands_in_the_table():
 def test_what_ends_undecided_says_why_and_which_limit_it_was():
     told = {each.name: each for each in limits()}
     assert all(bool(each.more) == (each.beyond not in (Beyond.REFUSED, Beyond.SHORTER)) for each in told.values())
-    raised = {name for _, text in sources() for name in re.findall(r'\bexhausted\("(\w+)"\)', text)}
+    raised = {name for _, text in sources() for name in re.findall(r'\blimit_exceeded\("(\w+)"\)', text)}
     assert len(raised) > 8
     for name in raised:
         assert name in told

@@ -1,4 +1,4 @@
-"""What a program asks of a map that has none of it: no frame on that map can match, and whoever runs it is told."""
+"""What a program asks of a map that has none of it: no frame on that map can match, and the user is told."""
 
 from __future__ import annotations
 

@@ -148,7 +148,7 @@ class ComposedScenario:
 
     @property
     def arrives(self) -> Node:
-        """That a sample shows what it makes, as a condition that no label says."""
+        """The condition that a sample shows the objects which the scenario makes; no label says it."""
         index = cast(int, self.objects[0].index)
         return Feature(index, f"{ARRIVES}{self.number}", "boolean", current=True, span=self.span)
 

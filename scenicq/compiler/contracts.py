@@ -335,7 +335,7 @@ class _Motion:
         return self.within(self.course(lane, name, against=against), _bound("lane"))
 
     def course(self, lane: ModelValue, name: str, *, against: bool = False) -> Node:
-        """Where one comes to who keeps to a lane.
+        """Where a driver comes to who keeps to a lane.
 
         Raises:
             ScenarioError: wrong-type: that is no lane.
@@ -584,7 +584,7 @@ def _follow_lane(
 
 
 def _keeps_lane(motion: _Motion, *, against: bool = False) -> Callable[[Node], Node]:
-    """The centre is where one of the lanes entered on leads to; who entered on none may be anywhere."""
+    """The centre is where a lane leads to that the object entered on; if it entered on none, it may be anywhere."""
     lookups, network = motion.run.lookups, motion.run.network
     table = lookups.table((id(network), "laneAt"), lambda: LookupTable.of_network(network, "laneAt"))
     lanes = (cast(Lane, each) for each in table.options)

@@ -121,7 +121,7 @@ def nominal_directions(run: Interpreter, owner: Network | NetworkElement) -> Bui
 
 
 def _directions(element: ModelValue, place: Node, span: Span) -> ModelValue:
-    """Those of one element; at a random place of an intersection one, which may be that of any way there."""
+    """The directions of traffic of one element; at a random place of an intersection, the one of any way there."""
     field = element.orientation if isinstance(element, NetworkElement) else None
     if field is None:
         return ()

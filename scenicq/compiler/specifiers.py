@@ -34,7 +34,7 @@ class BoundSpecifier:
         evaluate: Values of the properties, given the object so far.
         span: The specifier in the program.
         explicit: Whether the user's program rather than a library says it.
-        rank: Of several optional specifiers of a property the one of the lowest rank counts (Scenic 3's priorities).
+        rank: The lowest rank counts among several optional specifiers of a property (Scenic 3's priorities).
         modifies: A property that it gives only if no other specifier does; if one does, it adds a condition instead.
         condition: The condition: requires something of the finished object.
         perhaps: Whether Scenic may take what it gives optionally or the class's default, as it happens.

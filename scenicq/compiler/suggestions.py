@@ -112,11 +112,11 @@ _BY_NAME = {
     **{name: f"a direction is an angle, to the left of north: `{angle} deg`" for name, angle in _COMPASS.items()},
     "self": "`self` is for classes; a `require` after the object uses the object's name",
 }  # fmt: skip
-"""How the driving model says what people say with another name."""
+"""Hints for names that the driving model spells in another way."""
 _BESIDE = re.compile(
     r"(?i)_?(left|right)_?(lane|neighbou?r)?|(lane|neighbou?r)_?(to_?)?(left|right)|laneTo(Left|Right)"
 )
-"""What people call the lane beside another."""
+"""Names that authors give to the lane beside another."""
 _RATE = "`angularSpeed` is the rate at which it turns, in radians a second"
 _BY_ATTRIBUTE = {
     "yawrate": _RATE, "angularvelocity": _RATE, "turnrate": _RATE, "accel": "`acceleration` is along the course",
@@ -130,7 +130,7 @@ _BY_ATTRIBUTE = {
 }  # fmt: skip
 """How Scenic says what people ask an object for, by the attribute in small letters."""
 _ASIDE = re.compile(r"^_|At$|Region$")
-"""Attributes of the map that are not listed to who looks for one: look-ups and regions, each of which has a twin."""
+"""Attributes of the map that hints do not list: look-ups and regions that another attribute gives, too."""
 _OWNER = re.compile(r"([A-Za-z_][\w.]{0,60})\.\Z")
 """The dotted name before an attribute."""
 

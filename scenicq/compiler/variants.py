@@ -228,7 +228,7 @@ def _reachable(process: Process, ended: set[int]) -> Process:
 
 
 def _without_silent(dynamics: Dynamics) -> Dynamics:
-    """The same without scenarios of which it makes no difference whether they have begun."""
+    """Remove the scenarios for which it makes no difference whether they have begun."""
     silent = {
         number for number, each in enumerate(dynamics.scenarios)
         if not each.requirements and not each.processes and number not in dynamics.needs

@@ -178,7 +178,7 @@ class ShareComparison:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Groups:
-    """Who is set beside whom, by numbers of objects.
+    """Which objects are compared with which, by their numbers.
 
     Attributes:
         own: Objects in question that are compared, shape (n,).

@@ -38,7 +38,7 @@ _NORMAL = NormalDist()
 
 
 class Draws:
-    """The same draws for all labels, the same in every run.
+    """Random draws that are the same for all labels and in every run.
 
     Attributes:
         count: How many.

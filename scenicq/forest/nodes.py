@@ -561,7 +561,7 @@ class Body:
 
     @property
     def parts(self) -> tuple[Node, ...]:
-        """Those of the three that there are."""
+        """Condition, distance and value, as far as there are any."""
         return tuple(each for each in (self.condition, self.distance, self.value) if each is not None)
 
 

@@ -38,7 +38,7 @@ def views_of(log: Path, times: Sequence[int], images: Images, report: Report) ->
     Args:
         log: Folder of the log.
         times: Nanoseconds.
-        images: Of each camera; the nearest in time counts.
+        images: The images of each camera; the nearest in time counts.
         report: Takes what is unsound; a calibration that cannot be read counts as none.
     """
 

@@ -28,13 +28,13 @@ class RecordingFiles:
     """Where a recording lies.
 
     Attributes:
-        name: Of the recording, unique in the source.
+        name: Name of the recording, unique in the source.
         files: What it is read from; the first is the main one.
         root: The source as the user gave it; paths of sensor files are relative to it.
         map: Name of its map.
         options: What else the importer's function needs to know.
         weight: About how many label objects it has; by default from the size of the main file.
-        digest: Of its content; by default of the files.
+        digest: Checksum of its content; by default of the files.
     """
 
     name: str
@@ -89,7 +89,7 @@ def by_file_source(
     """A source of such recordings.
 
     Args:
-        name: Of the source.
+        name: Name of the source.
         maps: Elements of each map.
         places: The recordings.
         classes: Class of the tree for each class name.
@@ -158,7 +158,7 @@ def take_map(
     """Read a map, unless there is one of that name; one that cannot be read at all is left out.
 
     Args:
-        name: Of the map.
+        name: Name of the map.
         file: Where it lies.
         read: Reads it; what is unsound goes to the sink, counts of what is not read to the report.
         maps: Takes it.

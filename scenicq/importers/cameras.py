@@ -26,7 +26,7 @@ class Mount:
     """How a camera sits on a vehicle.
 
     Attributes:
-        pose: Of the camera (x to the right, y down, z ahead) in the vehicle's frame.
+        pose: Pose of the camera (x to the right, y down, z ahead) in the vehicle's frame.
         intrinsics: fx, fy, cx, cy, pixels.
     """
 
@@ -51,7 +51,7 @@ def place_camera(mount: Mount, vehicle: Pose, width: int, height: int) -> Camera
     Args:
         mount: How it sits there.
         vehicle: Pose of the vehicle in the frame of the map, when the image was taken.
-        width: Of the image, pixels.
+        width: Width of the image, pixels.
         height: The same.
 
     Raises:

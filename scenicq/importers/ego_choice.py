@@ -48,7 +48,7 @@ def with_egos(
         choice: `ImportOptions.ego`.
         recording: Name of the recording.
         map_name: Name of its map.
-        place: Of the recording in the source, for messages.
+        place: File and line of the recording in the source, for messages.
         report: Takes what is left out.
     """
     if choice is None:

@@ -50,14 +50,14 @@ class GroupedLines:
 
     Attributes:
         files: Files that one can jump in, with their names in messages.
-        runs: Of each recording.
+        runs: Runs of lines, by recording.
     """
 
     files: tuple[tuple[Path, str], ...]
     runs: Mapping[str, Runs] = field(repr=False)
 
     def of(self, recordings: Sequence[str]) -> GroupedLines:
-        """The same of some recordings."""
+        """Select some recordings."""
         return GroupedLines(self.files, {name: self.runs[name] for name in recordings})
 
     def read(self, recording: str) -> Iterator[tuple[bytes, str]]:

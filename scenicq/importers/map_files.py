@@ -107,7 +107,7 @@ def _storable(features: Sequence[MapFeature]) -> bool:
 
 
 def _storable_of(features: Sequence[MapFeature], file: str, report: Report) -> Iterator[MapFeature]:
-    """Those whose texts can be stored; the others are reported."""
+    """Keep the elements whose texts can be stored, and report the others."""
     for feature in features:
         try:
             check_characters(_texts(feature))

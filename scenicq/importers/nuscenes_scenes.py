@@ -46,7 +46,7 @@ class Instant:
 
     Attributes:
         place: File and line, for messages.
-        pose: Of the ego: x, y, heading, z.
+        pose: x, y, heading and z of the ego.
         sensors: Channel, file and camera, in order of the channels.
         boxes: How many of the scene's boxes are its.
     """
@@ -66,7 +66,7 @@ class SceneContent:
     Attributes:
         ahead_s: How far the local clock is ahead of UTC, seconds; None if unknown.
         instants: In order of time.
-        boxes: Of one instant after the other; the numbers of tracks are those of `tracks`.
+        boxes: Boxes of one instant after the other, with the numbers that tracks have in `tracks`.
         tracks: Token and class name of each track.
     """
 
@@ -206,7 +206,7 @@ def _velocities(tracks: NDArray[np.int64], times: NDArray[np.int64], xy: NDArray
 
     Args:
         tracks: Number of the track of each position, shape (n,).
-        times: Of each position, microseconds, in order.
+        times: Time of each position, microseconds, in order.
         xy: Positions, shape (n, 2).
     """
     order = np.argsort(tracks, kind="stable")

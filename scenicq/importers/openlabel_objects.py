@@ -29,7 +29,7 @@ class FrameObjects:
 
     Attributes:
         systems: Where they lie.
-        classes: Of their types.
+        classes: Classes of their types.
         report: Takes what is unsound.
         where: The frame, for messages.
     """

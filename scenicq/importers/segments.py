@@ -52,7 +52,7 @@ _COPIED = 65_536
 OnRecording = Callable[[str, int], None]
 """Called with a recording and its number of frames when it is written."""
 OnTold = Callable[[tuple[str, int]], None]
-"""The same for a worker, which tells what is then passed on."""
+"""What a worker calls instead: its message is passed on to `OnRecording`."""
 
 
 @dataclass(frozen=True, slots=True)

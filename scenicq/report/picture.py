@@ -75,7 +75,7 @@ class Shot:
 
     @property
     def roles(self) -> tuple[Role, ...]:
-        """Who plays whom, as far as the verdict says."""
+        """The roles in the picture, as far as the verdict says."""
         if self.scenario is None:
             return ()
         if self.explanation is not None:

@@ -1,4 +1,4 @@
-"""Intervals in a report: their frames as a run, and under the slider a timeline of who did what and what held when."""
+"""Intervals in a report: their frames as a run, and under the slider a timeline of what roles did and what held."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ __all__ = ["Arrivals", "LabelOf"]
 
 Members = NDArray[np.int64]
 LabelOf = Callable[[Scenario, Mapping[int, int], Sequence[frozenset[str]]], tuple[Label, Mapping[str, str]]]
-"""The label with those objects alone that play a role, of whom some properties are relevant; and who plays whom."""
+"""The label with only the objects that play a role, which properties are relevant, and the correspondence."""
 _AT_ONCE = 200_000
 """Places in memory."""
 
@@ -62,7 +62,7 @@ class _Scene:
 
     @property
     def scenario(self) -> Scenario:
-        """The scenario of those who are there then."""
+        """The scenario of the objects that are there then."""
         return self.search.matcher.scenario
 
 
@@ -254,7 +254,7 @@ class Arrivals:
         return found
 
     def _truth(self, scene: _Scene, places: BoundSamples, label: LabelOf | None) -> Truth:
-        """Whether a scenario may begin at each place; it may not where those who come are not seen."""
+        """Whether a scenario may begin at each place; it may not where the objects that it makes are not seen."""
         found = np.full(len(places), FALSE)
         members = {index: places.members[index] for index in range(scene.end)}
         come = np.logical_and.reduce([members[index] >= 0 for index in range(scene.first, scene.end)])

@@ -36,7 +36,7 @@ FIXED = frozenset({"width", "length", "height"})
 """Properties that are the same at each sample."""
 
 _AT_ONCE = 200_000
-"""Label objects in memory of whom something is asked."""
+"""Label objects in memory about which something is asked."""
 _COLUMNS = {
     "heading": "heading", "width": "width", "length": "length", "height": "height",
     "angularSpeed": "yaw_rate", "acceleration": "acceleration",
@@ -52,7 +52,7 @@ Numbers = NDArray[np.float64]
 
 
 class Observed(Protocol):
-    """Some samples with who plays whom in each."""
+    """Some samples, with the label object of each role."""
 
     def __len__(self) -> int:
         """The number of samples."""
@@ -237,7 +237,7 @@ def _observed(
     """The values of a property; arguments as `Observed.observed`.
 
     Args:
-        name: Of the property.
+        name: Name of the property.
         column: A column of the store by its name.
         said: The values that labels give beside the columns, None where there is none.
     """

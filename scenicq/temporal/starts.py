@@ -47,7 +47,7 @@ _SCALARS = frozenset({"heading", "width", "length", "height"})
 
 @dataclass(frozen=True, slots=True)
 class RoleCandidates:
-    """Who may play whom in the labels of a block.
+    """The candidates of each role in the labels of a block.
 
     Attributes:
         labels: The labels in question, in order.
@@ -67,7 +67,7 @@ class Starts:
     Attributes:
         members: Starts: by object of the scenario who plays it.
         left: The labels that the matcher must decide.
-        sure: Of these labels, whether the plain requirements on what is observed are known to hold.
+        sure: Whether the plain requirements on what is observed are known to hold, for each of these labels.
         failed: What the labels that are excluded failed at.
     """
 

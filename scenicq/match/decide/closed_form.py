@@ -95,7 +95,7 @@ class ClosedForm:
         return None
 
     def evaluate_one(self, get: Get, options: MatchOptions, lookups: MapLookups) -> Evaluated:
-        """The same without words; nothing is said where an expression has no value."""
+        """As `decide`, without words; None where an expression has no value."""
         try:
             return self.evaluate(get, options, lookups)
         except CannotEvaluate:

@@ -59,7 +59,7 @@ class Columns:
         return cast(Value, self._column(index, name))
 
     def some(self, which: NDArray[np.intp]) -> Columns:
-        """The same of some of the labels, by their numbers."""
+        """Select some of the labels, by their numbers."""
 
         def column(index: int, name: str) -> FloatColumn | tuple[FloatColumn, FloatColumn]:
             found = self._column(index, name)

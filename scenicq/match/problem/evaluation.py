@@ -41,7 +41,7 @@ def show_value(property_: str, value: Value) -> str:
 
 
 def unlike(property_: str, value: Value, observed: Value) -> str:
-    """That a label's value is not the one that the scenario gives, in a person's units."""
+    """Say that a label's value is not the one that the scenario gives, in units that people read."""
     return f"is {show_value(property_, observed)}, not {show_value(property_, value)}"
 
 

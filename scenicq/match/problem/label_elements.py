@@ -1,4 +1,4 @@
-"""The label objects of labels as the elements that conditions on others go through, and who of them plays a role."""
+"""The label objects that conditions on other label objects go through, and which of them play a role."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _WHO = (IDENTITY, TRACK)
 
 
 def observe_roles(problem: LabelProblem, assignment: Mapping[int, int]) -> dict[tuple[int, str], Value]:
-    """All label objects of a label, and which of them play the scenario's objects, as what is observed of it.
+    """Observe all label objects of a label, and which of them play the scenario's objects.
 
     Args:
         problem: The label.

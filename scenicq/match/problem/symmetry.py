@@ -129,7 +129,7 @@ def interchangeable(
     Args:
         scenario: The scenario.
         groups: What is asked of a label.
-        shapes: Of the groups.
+        shapes: Shapes of the groups.
         tolerance: Per feature.
         used: For each object the properties that matter, where what the program says of them must be alike, too.
     """
@@ -168,7 +168,7 @@ def classes_of_twins(twins: Mapping[int, int]) -> list[list[int]]:
 
 
 def sort_interchangeable(assignment: Mapping[int, int], twins: Mapping[int, int]) -> frozenset[tuple[int, int]]:
-    """Who plays whom, interchangeable objects in ascending order.
+    """An assignment in which interchangeable objects have label objects in ascending order.
 
     Args:
         assignment: The number of the label object of each object.

@@ -344,7 +344,7 @@ class _ChoiceSearch:
 
 
 def _is(index: Node, pick: int) -> Node:
-    """That an expression takes an option."""
+    """The condition that an index takes an option."""
     if kind_of(index) == "boolean":
         return index if pick else build.opposite(index)
     return build.compare(CompareOp.EQ, index, Constant(float(pick), span=index.span), index.span)

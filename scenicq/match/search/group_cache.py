@@ -213,7 +213,7 @@ def rename_variables(decided: tuple[Group, Outcome], target: Group) -> Outcome:
 
 
 def certain_group(group: Group) -> Group:
-    """The group that only those satisfy who satisfy it whatever is not observed."""
+    """The group that label objects satisfy only if they do for every value of what is not observed."""
     return replace(group, constraints=group.certain, doubtful=(), certain=())
 
 

@@ -159,7 +159,7 @@ class LabelSearch:
         self, plan_of: Callable[[Signature], MatchPlan], signature: Signature,
         candidates: Mapping[int, tuple[int, ...]], twins: Mapping[int, int],
     ) -> _Found:  # fmt: skip
-        """Those of one signature, some of them perhaps more than once; see `solutions`."""
+        """The solutions of one signature, some perhaps more than once; see `solutions`."""
         plan = plan_of(signature)
         monolithic = self.options.method == "monolithic"
         judged: _Judged | None = None

@@ -24,7 +24,7 @@ _PAYS_S = 3.0
 
 
 class BlockExecutor:
-    """Decides blocks, in order whoever does it; a context manager.
+    """Decides blocks here or in workers, and yields them in order; a context manager.
 
     A process that dies costs nothing but its block's time. Where a block kills every process which takes it,
     halving finds the frames that do so, and they are unknown.

@@ -57,8 +57,8 @@ def program_network(source: Source, folder: Path, version: int | None, cache: Pa
 
     Args:
         source: The program.
-        folder: Of the program; nothing outside of it is read.
-        version: Of Scenic; inferred if None.
+        folder: Folder of the program; nothing outside of it is read.
+        version: Version of Scenic; inferred if None.
         cache: See `read_network`.
 
     Raises:
@@ -132,7 +132,7 @@ def misfit_remarks(lacking: Mapping[str, Diagnostic], manifest: Manifest) -> Ite
 
     Args:
         lacking: What each of them lacks, by name.
-        manifest: Of the dataset; maps without frames are passed over.
+        manifest: Manifest of the dataset; maps without frames are passed over.
     """
     frames = {name: counts.frames for name, counts in manifest.by_map.items()}
     grouped: dict[str, list[str]] = {}

@@ -45,7 +45,7 @@ _BEGINS_S = 60
 """Seconds after which a folder that nobody uses is one that is left."""
 _CONNECT_S = 20
 _LOOK_S, _NOBODY_S = 2, 60
-"""Seconds between looks at who is there, and how long nobody may be."""
+"""Seconds between looks for workers, and seconds that none may be there."""
 
 _LATER = ("`--resume` with `-o FILE` goes on where a query stopped",)
 
@@ -54,7 +54,7 @@ def dask(address: str | None = None) -> Executor:
     """An executor that runs pieces on Dask.
 
     Args:
-        address: Of a scheduler, such as `tcp://host:8786`, whose workers have this version of scenicq and see the
+        address: Address of a scheduler (`tcp://host:8786`) whose workers have this version of scenicq and see the
             dataset under the same path. By default workers are started on this machine for the time of the query, as
             many as the query's `jobs` or, if that is None, as there are processors.
 

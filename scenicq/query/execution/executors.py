@@ -51,7 +51,7 @@ class Question:
 
     Attributes:
         dataset: The dataset.
-        fingerprint: Of dataset, program and options.
+        fingerprint: Checksum of dataset, program and options.
         source: The program.
         files: What reads the files that it imports.
         options: The options.

@@ -261,7 +261,7 @@ def _table(each: _Setting) -> str:
 
 
 def _full_columns(dataset: Dataset, table: str, names: Collection[str | None]) -> Collection[str | None]:
-    """Those of some columns of a table in which no row lacks a value."""
+    """Which of some columns of a table have a value in every row."""
     full = set(names)
     for file in dataset.files(table):
         if not full:

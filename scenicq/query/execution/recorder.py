@@ -60,7 +60,7 @@ class Recorder:
         )
 
     def fill(self, results: Sequence[Result]) -> list[Result]:
-        """The same results, in which matches carry what is recorded."""
+        """Put the recorded values into the results that match."""
         return list(fill_by_recording(results, self._of_recording))
 
     def _of_recording(self, recording: str, results: list[Result]) -> Iterator[Result]:

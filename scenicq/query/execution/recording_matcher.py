@@ -92,7 +92,7 @@ class Survivors:
     read: Callable[[NDArray[np.int64]], Iterator[Candidate]]
 
     def within(self, rows: Block, objects: tuple[int, int] | None) -> Survivors:
-        """Those of some recordings of the block.
+        """Select the survivors of some recordings of the block.
 
         Args:
             rows: The recordings.
@@ -297,7 +297,7 @@ class RecordingMatcher:
         return _Starts(table, dict(enumerate(decided, len(table) - len(decided))), undecided)
 
     def _candidates(self, block: TrackBlock, labels: NDArray[np.int64], left: Survivors) -> RoleCandidates | None:
-        """Who may play whom, if that is a matter of the label's own ego."""
+        """The candidates of each role; None unless the ego is the label's own."""
         scenario, options = self.matcher.scenario, self.matcher.options
         if options.ego != "label" or options.exact:
             return None
@@ -320,7 +320,7 @@ class RecordingMatcher:
         self, block: TrackBlock, labels: NDArray[np.int64], candidates: RoleCandidates | None,
         sure: NDArray[np.bool_], read: Iterator[Candidate],
     ) -> Iterator[tuple[int, Candidate, list[int], Mapping[int, tuple[int, ...]] | None, bool]]:  # fmt: skip
-        """Labels for the matcher, with their members, who may play whom, and whether plain requirements hold."""
+        """Labels for the matcher, with their members, candidates of the roles, and whether plain requirements hold."""
         members = _objects_of(block, labels) if candidates is None or self._whole else candidates.members
         plays: dict[int, NDArray[np.bool_]] = {}
         if candidates is not None:

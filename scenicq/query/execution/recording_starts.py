@@ -56,7 +56,7 @@ def few_findings(
         matcher: The matcher.
         label: The label.
         starts: How many its recording has already that match, and that are open; those of the label are added.
-        among: What is known of who may play whom.
+        among: Candidates of the roles, where they are known.
     """
     findings: list[Finding] = []
     for finding in matcher.findings(label, candidates=among, every_open=True):
@@ -103,7 +103,7 @@ def starts_of(
 
 @dataclass(frozen=True, slots=True)
 class NearestRoles:
-    """Who plays whom in a start as it is told: interchangeable objects come nearest first.
+    """The correspondence of a start as it is reported: interchangeable objects come nearest first.
 
     Attributes:
         members: Who plays each object, by index, as a member of the block.
@@ -182,12 +182,12 @@ def start_table(
 def label_of(
     scenario: Scenario, block: TrackBlock, members: Mapping[int, int], map_name: str, relevant: Sequence[frozenset[str]]
 ) -> tuple[Label, dict[str, str]]:
-    """The label of a start with those objects alone that play a role, and what is relevant of them; who plays whom.
+    """Make the label of a start, with only the objects that play a role and what is relevant, and the correspondence.
 
     Args:
         scenario: The scenario; its ego is the label's.
         block: The block.
-        members: Who plays each object.
+        members: Row of the label object of each role.
         map_name: The map of the label.
         relevant: The properties that matter of each object.
     """

@@ -461,7 +461,7 @@ class Query:
         return any(map(has_timelines, self._scenarios()))
 
     def with_timelines(self, results: Sequence[Result]) -> list[Result]:
-        """The same results, in which intervals that match say what their roles do from when to when.
+        """Put timelines into intervals that match: what their roles do from when to when.
 
         Args:
             results: The results, those of one recording together.
@@ -527,7 +527,7 @@ class Query:
         """What decides the blocks of this query in one process; to be used in a `with` statement.
 
         Args:
-            threads: Of the database; as many as it likes by default.
+            threads: Threads of the database; by default as many as it likes.
         """
         options = self.options
         return Decider(

@@ -103,7 +103,7 @@ class Timelines:
         self._variants = [_Variant(each, self.options) for each in self.scenario.variants or (self.scenario,)]
 
     def fill(self, results: Sequence[Result]) -> list[Result]:
-        """The same intervals, in which matches say what their roles do."""
+        """Put timelines into intervals that match."""
         return list(fill_by_recording(results, self._of_recording))
 
     def _of_recording(self, recording: str, results: list[Result]) -> Iterator[Result]:

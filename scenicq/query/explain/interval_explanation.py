@@ -181,7 +181,7 @@ def explain_recording(query: Query, solver: Solver, name: str, begins: int | flo
     Args:
         query: A query over time.
         solver: Decides what is not decided otherwise.
-        name: Of the recording.
+        name: Name of the recording.
         begins: Where the interval shall begin: a timestamp in microseconds, or, as a float, the seconds from where the
             recording begins, to half the time between two frames; anywhere by default.
 
@@ -391,7 +391,7 @@ def _is_after(block: TrackBlock, start: _Start, samples: Mapping[tuple[tuple[int
 
 
 def locate_interval(query: Query, result: Result) -> tuple[Scenario, RecordingTracks, IntervalVerdict]:
-    """The interval of a result: the scenario over its map, its recording, and where in it who plays whom.
+    """Find the interval of a result: the scenario over its map, its recording, and the roles and samples in it.
 
     Raises:
         ValueError: The result is of a frame.

@@ -138,7 +138,7 @@ def _by_number(query: Query, results: Sequence[Result]) -> _Near | None:
 
     Args:
         query: The query.
-        results: Of one recording, at least one, none of which matches.
+        results: Results of one recording, at least one, none of which matches.
     """
     changes: list[Change] = []
     for result in results:

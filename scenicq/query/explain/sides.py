@@ -33,7 +33,7 @@ class Side:
         negated: Whether it stands under a `not`, and so must be false.
         true: Whether it is as it must be.
         apart: How far the values are apart.
-        unit: Of the values: "deg", "m" or empty.
+        unit: Unit of the values: "deg", "m" or empty.
     """
 
     text: str
@@ -56,7 +56,7 @@ def sides(
         attempt: The label.
         constraint: The requirement.
         assignment: The correspondence.
-        values: Of the random variables.
+        values: Values of the random variables.
     """
     stack: list[tuple[Node, bool]] = [(constraint.expression, True)]
     while stack:
