@@ -286,7 +286,7 @@ class Limits:
     outcomes_over_time: int = _undecided(
         3000,
         "outcomes",
-        "of the choices that conditions over time hang on",
+        "of the choices that conditions over time depend on",
         "too many outcomes of random choices to tell apart",
     )
     direction_choices: int = _undecided(

@@ -85,7 +85,7 @@ def _absent(value: Value) -> tuple[str, ...] | None:
 
 
 def check_directions(objects: Iterable[ScenarioObject], requirements: Iterable[Requirement]) -> None:
-    """Refuse what hangs on a direction of traffic on a map that has none: no label could ever match.
+    """Refuse what depends on a direction of traffic on a map that has none: no label could ever match.
 
     Args:
         objects: Whose positions and headings are looked at.

@@ -8,8 +8,8 @@ How a contract is checked. A *mode* is entered at a sample. From `--reaction` an
 mode is out of its contract at a sample if `shows` is false at every sample of the last `settles_s` seconds:
 accelerations are slopes over a second, and boxes jump, so that only what no sample of a second shows is not shown. And
 what the program's own conditions switch to, which slopes show before it comes, breaks nothing. `shows_from` is the same
-for what hangs on the place where the mode was entered. A behavior that goes through several phases gives a contract for
-each: modes of their own, one after the other.
+for what depends on the place where the mode was entered. A behavior that goes through several phases gives a contract
+for each: modes of their own, one after the other.
 
 What is weaker than what behaviors do: the order of the lanes of a trajectory is seen by the direction of travel alone;
 a change of lanes need not begin, only end; that a heading is *held* is seen by motion along the object's own heading;
@@ -71,7 +71,7 @@ class Contract:
         remains: Whether what it shows goes on after it is over, until the object does something else, as who is sent
             walks on.
         shows_from: Gives what must be shown besides by who entered the mode at a place, an expression: where it was as
-            observed, or a feature that is not observed; None where nothing hangs on it.
+            observed, or a feature that is not observed; None where nothing depends on it.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Conditions whose course hangs on the scene: `if`, filters, `sorted` and their like in `require`, monitors and ends.
+"""Conditions whose course depends on the scene: `if`, filters, `sorted` and their like in `require`, monitors and ends.
 
 Scenic evaluates such a condition on the drawn scene, on which everything is known. Here a label takes the scene's place
 later on. So the condition is evaluated once for each course that it may take, and becomes a choice between their

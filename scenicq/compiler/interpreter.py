@@ -268,7 +268,7 @@ class Interpreter:
         return instance
 
     def _may_lack(self, index: Node) -> bool:
-        """Whether some option of a choice lacks a part that the program asks for, or of one that its index hangs on."""
+        """Whether an option of a choice, or of one that its index depends on, lacks a part that the program asks for."""
         todo, seen = [index], set[tuple[int, str]]()
         while todo:
             for node in postorder([todo.pop()]):

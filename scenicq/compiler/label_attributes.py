@@ -1,7 +1,7 @@
 """Attributes that labels of a dataset have and a program does not give its objects: conditions read what labels say.
 
 Scenic itself has no such property, and refuses a program that reads it; one that says `with NAME VALUE` is for both.
-Only a dataset tells which attributes there are. Where a label lacks one, what hangs on it is unknown.
+Only a dataset tells which attributes there are. Where a label lacks one, what depends on it is unknown.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 A `Body` is evaluated in columns over rows, one for each label object of each place, and then told for each place, in
 three truth values: what a label object does not observe, and whether one of a coarser class is of the class in
-question, are unknown, and so is what hangs on it.
+question, are unknown, and so is what depends on it.
 """
 
 from __future__ import annotations

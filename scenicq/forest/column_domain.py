@@ -122,7 +122,7 @@ _BINARY: Mapping[ArithmeticOp, Callable[[Array, Array], Array]] = {
 
 @dataclass(frozen=True, slots=True)
 class ColumnDomain:
-    """Values for many places; undefined ones spread, unknown ones hide what hangs on them.
+    """Values for many places; undefined ones spread, unknown ones hide what depends on them.
 
     Attributes:
         observed: The column of a feature.

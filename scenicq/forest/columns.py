@@ -43,7 +43,7 @@ Array: TypeAlias = NDArray[Any]
 Vectors: TypeAlias = tuple[Array, Array]
 """The x and y coordinates of vectors."""
 DEFINED, UNDEFINED, UNKNOWN = np.int8(0), np.int8(1), np.int8(2)
-"""Whether there is a value at a place: where several hold of what a value hangs on, the last of them."""
+"""Whether there is a value at a place: where several hold of what a value depends on, the last of them."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -146,7 +146,7 @@ def truth_of(data: Data) -> Array:
 
 
 def common_status(columns: Sequence[Column]) -> NDArray[np.int8]:
-    """The status of what hangs on all of some columns."""
+    """The status of what depends on all of some columns."""
     status = columns[0].status
     for column in columns[1:]:
         status = np.maximum(status, column.status)

@@ -26,7 +26,7 @@ def impossible_requirements(scenarios: Sequence[Scenario], *, real: bool) -> lis
 
     Args:
         scenarios: The program as compiled against each map, none of them made ready.
-        real: Whether the maps are those that are meant; if not, what hangs on a map is not spoken of.
+        real: Whether the maps are those that are meant; if not, what depends on a map is not spoken of.
     """
     found = [dict.fromkeys(_impossible(each, real=real)) for each in scenarios]
     return [each for each in found[0] if all(each in others for others in found[1:])] if found else []

@@ -150,9 +150,9 @@ class Expressions:
                 x, y = cast(TermVector, args[0])
                 return apply(ArithmeticOp.ATAN2, apply(ArithmeticOp.NEG, x), y)
             case CourseCoordinate() | Measure() | LaneCourse() | Corridor() | AheadInLanes():
-                raise CannotEvaluate("a course that hangs on what no label shows")
+                raise CannotEvaluate("a course that depends on what no label shows")
             case Among():
-                raise CannotEvaluate("a condition on other label objects that hangs on what no label shows")
+                raise CannotEvaluate("a condition on other label objects that depends on what no label shows")
             case DirectionAt():
                 return self._direction(node, cast(TermVector, args[1]))
             case Compare():

@@ -1,4 +1,4 @@
-"""Random variables of the scene that conditions over time hang on, and comparisons that are affine in them.
+"""Random variables of the scene that conditions over time depend on, and comparisons that are affine in them.
 
 A variable is drawn once, so all samples see one value of it. A comparison that is affine in it changes its outcome at
 one value for each sample, its cut (`hidden_conditions`).
@@ -85,7 +85,7 @@ def support(leaf: Leaf) -> tuple[float, float]:
 
 
 def comparisons_of(leaf: Leaf, conditions: Sequence[Node]) -> Iterator[Compare]:
-    """The comparisons that hang on a variable."""
+    """The comparisons that depend on a variable."""
     for node in postorder(tuple(conditions)):
         if not any(_hangs_on(child, leaf) for child in children(node)):
             continue

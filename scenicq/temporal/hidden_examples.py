@@ -1,4 +1,4 @@
-"""Runs whose conditions hang on random variables in ways that no cells tell apart, such as a hidden point.
+"""Runs whose conditions depend on random variables in ways that no cells tell apart, such as a hidden point.
 
 The matcher gives one example of values with which the label at the start matches. With it every condition has a value
 at every sample. The matcher is asked for bounds of the numbers and points among them that do not change over time;
@@ -110,7 +110,7 @@ class Example:
     Attributes:
         values: The values of the variables of conditions over time.
         witness: The values of all, by their place in the program.
-        truth: What they make of each condition that hangs on them, at each sample.
+        truth: What they make of each condition that depends on them, at each sample.
     """
 
     values: Mapping[Identity, Value]
@@ -126,9 +126,9 @@ class Examples:
         initial: What the label of the start is matched with.
         start: The start.
         columns: Over the samples.
-        conditions: Those that hang on random variables, expanded, by number.
+        conditions: Those that depend on random variables, expanded, by number.
         first: The sample of the start.
-        decide: The run, given conditions that hang on random variables.
+        decide: The run, given conditions that depend on random variables.
         found: Examples so far.
     """
 

@@ -1,4 +1,4 @@
-"""Runs whose conditions hang on random variables of the scene: the best that any values of these make of each start."""
+"""Runs whose conditions depend on random variables of the scene: for each start, the best that any values give."""
 
 from __future__ import annotations
 
@@ -139,7 +139,7 @@ class HiddenRuns:
         thin = _thin(pieces)
         doubted = thin & (pieces.truth == TRUE)
         if not joint:
-            # where other values prove the same, nothing hangs on these
+            # where other values prove the same, nothing depends on these
             end = pieces.owner * (int(pieces.ends.max(initial=0)) + 1) + pieces.ends
             doubted &= ~np.isin(end, end[~thin & (pieces.truth == TRUE)])
         self._confirm(pieces, np.flatnonzero(doubted), stretches, expanded, hidden)
@@ -221,7 +221,7 @@ class HiddenRuns:
             pieces: The runs.
             order: Their order, those of each start from the best one on.
             firsts: Where in it each start's begin.
-            hidden: What hangs on hidden numbers.
+            hidden: What depends on hidden numbers.
             joint: Those numbers that the initial scene has, too.
             stretches: Stretches with their starts.
             remember: The label of a start by its number.

@@ -2,7 +2,7 @@
 
 A binding gives each object of the scenario a track, for the whole interval. A start is a sample whose label matches
 the initial scene under a binding. All runs of a block are followed side by side, on columns over the samples in which
-all tracks of a binding live (`stretches`); where conditions hang on random variables of the scene, by the values of
+all tracks of a binding live (`stretches`); where conditions depend on random variables of the scene, by the values of
 these for which they hold (`hidden_runs`).
 """
 
@@ -129,7 +129,7 @@ class IntervalMatcher:
         options: The options of intervals.
         solver: Decides what is not decided otherwise.
         reasons: Whether somebody reads what bindings fail at.
-        outcomes: The outcomes of the choices that conditions over time hang on.
+        outcomes: The outcomes of the choices that conditions over time depend on.
     """
 
     scenario: Scenario
@@ -183,7 +183,7 @@ class IntervalMatcher:
         parts: list[Runs] = []
         for outcome in cast("list[int]", np.unique(table.outcomes).tolist()):
             which = np.flatnonzero(table.outcomes == outcome)
-            # a machine has met nothing before, so that what becomes of a block hangs on no other one
+            # a machine has met nothing before, so that what becomes of a block depends on no other one
             own = table.chosen(which)
             program = _Program(InitialScene(self.outcomes[outcome].scenario, self.match, self.solver))
 

@@ -94,7 +94,7 @@ class Progression:
         return _any_of(_all_of(values[number] for number, _ in clause) for clause in rest)
 
     def _here(self, numbers: set[int]) -> list[int]:
-        """The parts that hang on this sample, each behind those that it is made of."""
+        """The parts that depend on this sample, each behind those that it is made of."""
         found = set(numbers)
         stack = list(numbers)
         while stack:

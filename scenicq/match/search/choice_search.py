@@ -196,7 +196,7 @@ class _ChoiceSearch:
         return None
 
     def _about(self, slot: int) -> Constraint:
-        """A constraint that hangs on a slot."""
+        """A constraint that depends on a slot."""
         return next((part.item[0] for part in self.parts if slot in part.slots), self.items[0][0])
 
     # --- the search
@@ -241,7 +241,7 @@ class _ChoiceSearch:
                     self.doubt = self.doubt or outcome
                     answer = Consistency.NO
                 continue
-            # what already hangs on nothing open may be unsatisfiable together
+            # what already depends on nothing open may be unsatisfiable together
             ready = [part for part in component.parts if part.slots <= assigned]
             if len(ready) > 1 and any(slot in part.slots for part in ready):
                 slots = frozenset(each for part in ready for each in part.slots)

@@ -132,7 +132,7 @@ def _scratch() -> Generator[str]:
     from dask import config  # noqa: PLC0415 - optional
 
     with tempfile.TemporaryDirectory(prefix=_SCRATCH, ignore_cleanup_errors=True) as folder:
-        # ages by the clock of the file system alone: nothing here hangs on the time that the machine is set to
+        # ages by the clock of the file system alone: nothing here depends on the time that the machine is set to
         begun = Path(folder).stat().st_mtime
         for left in Path(tempfile.gettempdir()).glob(f"{_SCRATCH}*"):
             with contextlib.suppress(OSError):

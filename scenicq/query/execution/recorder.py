@@ -110,7 +110,7 @@ def _told(
 def _values(columns: AtomColumns, value: Node) -> tuple[list[RecordedCell], list[str]]:
     """A value at each sample, None where there is none, and the reason for that.
 
-    What hangs on a choice without a value, such as which of several lanes is meant, is known where all options that
+    What depends on a choice without a value, such as which of several lanes is meant, is known where all options that
     there are agree.
     """
     size, found = len(columns.samples), list[tuple[list[RecordedCell], list[str]]]()

@@ -366,7 +366,7 @@ class Query:
                 self.funnel.warnings.append(remark)
 
     def notes(self, maps: Iterable[str] | None = None) -> list[Diagnostic]:
-        """How the program is read where that hangs on the dataset, and what it cannot record, each thing once.
+        """How the program is read where that depends on the dataset, and what it cannot record, each thing once.
 
         Arguments as of `fitting`.
         """

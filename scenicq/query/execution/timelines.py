@@ -64,7 +64,7 @@ class _Variant:
         return frozenset(owner.name for owner in self.scenario.every_object)
 
     def read(self, outcome: int) -> list[str]:
-        """The random variables that conditions over time hang on, with an outcome."""
+        """The random variables that conditions over time depend on, with an outcome."""
         if outcome not in self._read:
             scenario = self.outcomes[outcome].scenario
             conditions = () if scenario.dynamics is None else scenario.dynamics.conditions
