@@ -268,7 +268,7 @@ class Interpreter:
         return instance
 
     def _may_lack(self, index: Node) -> bool:
-        """Whether an option of a choice, or of one that its index depends on, lacks a part that the program asks for."""
+        """Whether an option of a choice, or of one that its index depends on, lacks a part that the program needs."""
         todo, seen = [index], set[tuple[int, str]]()
         while todo:
             for node in postorder([todo.pop()]):
