@@ -24,10 +24,10 @@ from scenicq.match.options import MatchOptions
 from scenicq.match.problem.constraints import build_groups, describe_constraint
 from scenicq.match.problem.preprocess import prepare_scenario
 from scenicq.option_values import read_values
-from scenicq.query.execution.compiled_map import about_dataset, is_about_map, program_network, read_network
 from scenicq.query.execution.never_compared import coverage
 from scenicq.query.execution.option_texts import QUERY_OPTIONS
 from scenicq.query.execution.program_files import SiblingFiles
+from scenicq.query.execution.program_map import about_dataset, is_about_map, program_network, read_network
 from scenicq.store.atomic_files import write_whole
 from scenicq.store.dataset import Dataset
 from scenicq.store.said_values import said_types

@@ -27,17 +27,17 @@ from scenicq.match.problem.preprocess import prepare_scenario
 from scenicq.match.verdict import Cause, NoMatch
 from scenicq.query.execution.block_executor import BlockExecutor
 from scenicq.query.execution.block_matcher import MAPS_KEPT, CompiledMap, Decided, Decider, has_timelines
-from scenicq.query.execution.compiled_map import (
+from scenicq.query.execution.frames_ahead import FramesAhead, telling
+from scenicq.query.execution.merged_blocks import merge_frames, merge_intervals, until_deadline
+from scenicq.query.execution.never_compared import Coverage, coverage
+from scenicq.query.execution.program_files import SiblingFiles
+from scenicq.query.execution.program_map import (
     about_dataset,
     is_about_map,
     map_remark,
     misfit_remarks,
     program_remarks,
 )
-from scenicq.query.execution.frames_ahead import FramesAhead, telling
-from scenicq.query.execution.merged_blocks import merge_frames, merge_intervals, until_deadline
-from scenicq.query.execution.never_compared import Coverage, coverage
-from scenicq.query.execution.program_files import SiblingFiles
 from scenicq.query.execution.recorded_columns import RecordedColumn, columns_of
 from scenicq.query.execution.result_selection import ResultSelection
 from scenicq.query.execution.results import Funnel, Result, limit_matches

@@ -13,9 +13,9 @@ from scenicq.compiler.named_map import named_map
 from scenicq.errors import DataError, ScenarioError, Source
 from scenicq.importers.ingest import ingest
 from scenicq.match.verdict import NoMatch
-from scenicq.query.execution.compiled_map import program_network, read_network
 from scenicq.query.execution.executors import ordered_results, run_here
 from scenicq.query.execution.pieces import partitions
+from scenicq.query.execution.program_map import program_network, read_network
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.dataset import open_dataset
 
