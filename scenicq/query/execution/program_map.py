@@ -1,8 +1,8 @@
 """The map of a program: read where there is no dataset, and what the author is told about it where there is one.
 
 A query uses the dataset's maps, on which the labels lie, whatever map the program names; then the remarks here say that
-the program's map is not used, or what the dataset's maps lack. Without a dataset, the map is the one that the user gives
-or that the program names.
+the program's map is not used, or what the dataset's maps lack. Without a dataset, the map is the one that the user
+gives or that the program names.
 """
 
 from __future__ import annotations
