@@ -84,7 +84,7 @@ class Recorder:
             marks = {leaf.span.mark for leaf in leaves(value) if leaf.span is not None}
             if any(not marks.isdisjoint(proof) for proof in proofs):
                 for place, proof in enumerate(proofs):
-                    alone = own.chosen([place])
+                    alone = own.select([place])
                     given = alone.columns(self.scenario).assigned(assignment_of((value,), proof))
                     found[place][each.name] = next(_told(alone, each, *_values(given, value)))
             else:

@@ -142,7 +142,7 @@ class Timelines:
             look()
             scenario = variant.outcomes[number].scenario
             assert scenario.dynamics is not None
-            some = own.chosen(places)
+            some = own.select(places)
             truths = self._truths(variant, scenario, some, dict(values))
             labels = some.labels()
             for which, chosen in zip(some.numbers, some.slices(), strict=True):
