@@ -1,7 +1,7 @@
 """`others`, `count` and `nearest` of the module `scenicq.labels`: label objects that need not play a role.
 
 A condition on each of them is evaluated once, over an *element*: an object that stands for any of them. The result
-becomes an `Among` node (`forest/among`) where `any`, `all`, `len` or one of the functions here says what is asked of all.
+becomes an `Among` node (`forest/among`) where `any`, `all`, `len` or a function here says what is asked of all.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ def _element(objects: LabelObjects, span: Span) -> Instance:
 def others(run: Interpreter, span: Span, *args: ModelValue, **named: ModelValue) -> ModelValue:
     """`others(C)`: the label objects of a class that play no role."""
     cls = _class(run, span, "others", args, named, ())
-    return LabelObjects(cls, tuple(_identity(each, TRACK, span) for each in run.objects))
+    return LabelObjects(cls, tuple(_feature(each, TRACK, span) for each in run.objects))
 
 
 def count(run: Interpreter, span: Span, *args: ModelValue, **named: ModelValue) -> ModelValue:
@@ -114,9 +114,9 @@ def is_nearest(one: Instance, other: Nearest, span: Span) -> Node:
         raise fail("wrong-type", "only an object can be the nearest", span, f"this is {describe(one)}")
     objects, element = other.objects, _element(other.objects, span)
     counts, ego = other.counts(element), other.ego
-    same = _compare("==", _identity(element, IDENTITY, span), _identity(one, IDENTITY, span), span)
+    same = _compare("==", _feature(element, IDENTITY, span), _feature(one, IDENTITY, span), span)
     away, least = operators.distance_to(element, ego, span), operators.distance_to(one, ego, span)
-    ranks = _compare("<", _identity(element, RANK, span), _identity(one, RANK, span), span)
+    ranks = _compare("<", _feature(element, RANK, span), _feature(one, RANK, span), span)
     before = build.logic(
         LogicOp.OR,
         _compare("<", away, least, span),
@@ -132,7 +132,7 @@ def is_nearest(one: Instance, other: Nearest, span: Span) -> Node:
         span,
     )
     # where it is not seen, nothing is known of it, also where nobody is
-    seen = Compare(CompareOp.EQ, _identity(one, IDENTITY, span), _identity(one, IDENTITY, span), span=span)
+    seen = Compare(CompareOp.EQ, _feature(one, IDENTITY, span), _feature(one, IDENTITY, span), span=span)
     return Select(
         seen,
         (build.constant(False), _all_of((is_there, build.opposite(someone)), span=span)),
@@ -163,7 +163,7 @@ def same_object(one: Instance, other: Instance, span: Span) -> ModelValue:
     """Whether an element and an object, or two elements, are one label object."""
     if one is other or one.index is None or other.index is None:
         return one is other
-    return _compare("==", _identity(one, IDENTITY, span), _identity(other, IDENTITY, span), span)
+    return _compare("==", _feature(one, IDENTITY, span), _feature(other, IDENTITY, span), span)
 
 
 def truth_of_list(op: str, items: OtherList, span: Span) -> Node:
@@ -210,10 +210,10 @@ def _class(
 
 def _all_but_ego(run: Interpreter, cls: ScenicClass, span: Span) -> LabelObjects:
     """The label objects of a class besides the ego."""
-    return LabelObjects(cls, (_identity(run.ego(span), TRACK, span),))
+    return LabelObjects(cls, (_feature(run.ego(span), TRACK, span),))
 
 
-def _identity(each: Instance, name: str, span: Span) -> Feature:
+def _feature(each: Instance, name: str, span: Span) -> Feature:
     return Feature(cast(int, each.index), name, "scalar", True, span=span)
 
 

@@ -75,7 +75,7 @@ class Placed:
 
 
 Data: TypeAlias = "Array | Vectors | Coded | Placed"
-"""Numbers or truth values, the coordinates of vectors, or other values; meaningless where the status is not `DEFINED`."""
+"""Numbers or truth values, the coordinates of vectors, or other values; meaningless where nothing is defined."""
 
 
 class Column(NamedTuple):
@@ -108,7 +108,7 @@ class ColumnPlaces:
         return np.column_stack([self.spread(axis)[self.defined] for axis in cast("tuple[Array, Array]", data)])
 
     def combinations(self, columns: Sequence[Column]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """Places with all combinations of arguments there are, and for each defined place the index of its combination."""
+        """Places with every combination of arguments, and for each defined place the index of its combination."""
         code: Array = np.zeros(len(self.defined), dtype=np.intp)
         for column in columns:
             data = column.data
