@@ -35,7 +35,7 @@ from scenicq.temporal.hidden_examples import InitialScene
 from scenicq.temporal.hidden_runs import HiddenRuns, Remembered
 from scenicq.temporal.interval_options import IntervalOptions
 from scenicq.temporal.outcomes import Outcome, outcomes_of, steady_value
-from scenicq.temporal.presence import by_presence
+from scenicq.temporal.presence import group_by_observed
 from scenicq.temporal.run_lanes import follow_runs
 from scenicq.temporal.run_machine import RunMachine
 from scenicq.temporal.runs import Detail, Runs
@@ -217,7 +217,7 @@ class IntervalMatcher:
         if dynamics is None:
             yield stretches, _static(stretches, table)
             return
-        for chosen_ in by_presence(stretches.places, *dynamics.conditions, stretches=stretches.bounds[:-1]):
+        for chosen_ in group_by_observed(stretches.places, *dynamics.conditions, stretches=stretches.bounds[:-1]):
             some = stretches if len(chosen_) == len(stretches.labels) else stretches.some(chosen_)
             columns = AtomColumns(program.scenario, some.places, start=some.heads())
             expanded = [columns.expanded(condition) for condition in dynamics.conditions]

@@ -34,7 +34,7 @@ from scenicq.number_ranges import expand_ranges
 from scenicq.store.track_block import TrackBlock
 from scenicq.temporal.atoms import AtomColumns
 from scenicq.temporal.outcomes import Outcome
-from scenicq.temporal.presence import by_presence, observes
+from scenicq.temporal.presence import group_by_observed, observed_properties
 from scenicq.temporal.samples import WITH_COLUMNS, BoundSamples
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
@@ -217,7 +217,7 @@ class StartSearch:
             left = np.flatnonzero(holds > FALSE)
             asked = places if len(left) == len(places) else places.at(left)
             truth = np.full(len(left), UNKNOWN)
-            for chosen in by_presence(asked, requirement.condition):
+            for chosen in group_by_observed(asked, requirement.condition):
                 columns = AtomColumns(self.matcher.scenario, asked.at(chosen))
                 expanded = columns.expanded(requirement.condition)
                 # what is random where the label does not tell is the matcher's
@@ -298,7 +298,7 @@ class StartSearch:
         """
         holds, fails = np.zeros(size, np.bool_), np.zeros(size, np.bool_)
         places, ordered = BoundSamples(block, members, size), {index: mine.copy() for index, mine in members.items()}
-        for signature, chosen in observes(places, self._relevant):
+        for signature, chosen in observed_properties(places, self._relevant):
             plan = self.rest.plans.plan((*signature, frozenset()))
             forms = [group.closed_form for group in plan.groups if group.closed_form is not None]
             if len(forms) < len(plan.groups) or not _in_order(block, plan, ordered, chosen):
