@@ -80,7 +80,7 @@ def draw_overlay(
     Args:
         scenario: The scenario.
         broken: What excludes the frame.
-        roles: Who plays whom.
+        roles: The label object of each role.
         plane: Where the picture lies.
         bounds: What is drawn, in metres.
     """
@@ -133,7 +133,7 @@ def draw_blame(broken: tuple[Blame, ...], roles: tuple[Role, ...], plane: Plane)
 
     Args:
         broken: What excludes the frame.
-        roles: Who plays whom.
+        roles: The label object of each role.
         plane: Where the picture lies.
     """
     parts: list[str] = []

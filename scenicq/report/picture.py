@@ -132,7 +132,7 @@ def view_of(label: Label, roles: tuple[Role, ...], half: float | None = None) ->
 
     Args:
         label: The label.
-        roles: Who plays whom.
+        roles: The label object of each role.
         half: Metres from the middle to the edge; chosen if None.
     """
     ego = label.ego

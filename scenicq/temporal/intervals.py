@@ -166,7 +166,7 @@ class IntervalMatcher:
 
         Args:
             table: The starts.
-            remember: The label of a start by its number, with who plays whom.
+            remember: Gives the label of a start by its number, with the correspondence.
             every: Whether bindings without an interval are told of, too.
             label: Makes labels of samples at which objects come.
         """
@@ -217,8 +217,8 @@ class IntervalMatcher:
         if dynamics is None:
             yield stretches, _static(stretches, table)
             return
-        for chosen_ in group_by_observed(stretches.places, *dynamics.conditions, stretches=stretches.bounds[:-1]):
-            some = stretches if len(chosen_) == len(stretches.labels) else stretches.some(chosen_)
+        for places in group_by_observed(stretches.places, *dynamics.conditions, stretches=stretches.bounds[:-1]):
+            some = stretches if len(places) == len(stretches.labels) else stretches.some(places)
             columns = AtomColumns(program.scenario, some.places, start=some.heads())
             expanded = [columns.expanded(condition) for condition in dynamics.conditions]
             look()

@@ -76,7 +76,7 @@ class BoundSamples:
 
     Attributes:
         block: The recordings.
-        members: By object of the scenario, who plays it at each place; -1 where it is not observed.
+        members: For each role, its member at each place; -1 where it is not observed.
         size: How many places there are.
         labels: The label of each place; None where somebody is observed at each.
         classes: How classes are compared.
@@ -201,7 +201,7 @@ class Samples:
 
     Attributes:
         tracks: The recording.
-        binding: Who plays whom.
+        binding: The track of each role.
         first, end: Samples of the stretch, the end left out.
     """
 

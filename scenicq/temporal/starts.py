@@ -22,7 +22,7 @@ from scenicq.forest.scenario import Requirement
 from scenicq.forest.walk import features, leaves
 from scenicq.limits import LIMITS
 from scenicq.match.decide.closed_form import ClosedForm
-from scenicq.match.decide.range_forms import Columns, FloatColumn, Get
+from scenicq.match.decide.range_forms import Columns, FloatColumn, Lookup
 from scenicq.match.matcher import Matcher
 from scenicq.match.problem.constraints import Signature, describe_constraint, relevant_properties
 from scenicq.match.problem.map_lookups import MapLookups
@@ -65,7 +65,7 @@ class Starts:
     """What the arrays tell of labels.
 
     Attributes:
-        members: Starts: by object of the scenario who plays it.
+        members: For each role, its member at each start.
         left: The labels that the matcher must decide.
         sure: Whether the plain requirements on what is observed are known to hold, for each of these labels.
         failed: What the labels that are excluded failed at.
@@ -357,7 +357,7 @@ def _column(places: BoundSamples, index: int, name: str) -> FloatColumn | tuple[
     return (found[0], found[1]) if len(found) == 2 else found[0]
 
 
-def _getter(places: BoundSamples, number: int) -> Get:
+def _getter(places: BoundSamples, number: int) -> Lookup:
     """The observed values of one choice of label objects."""
 
     def get(index: int, name: str) -> Value:

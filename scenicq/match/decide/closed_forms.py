@@ -24,8 +24,8 @@ from scenicq.forest.walk import children, leaves, postorder
 from scenicq.match.decide.closed_form import ClosedForm, Evaluated
 from scenicq.match.decide.closed_numbers import heading, number, text
 from scenicq.match.decide.closed_positions import known_vector, offset, point_in
-from scenicq.match.decide.compiled_expressions import VECTORS, CompiledExpressions, element_field, truth
-from scenicq.match.decide.range_forms import Columns, FloatColumn, Get, Scalar
+from scenicq.match.decide.compiled_expressions import VECTORS, CompiledExpressions, compile_condition, element_field
+from scenicq.match.decide.range_forms import Columns, FloatColumn, Lookup, Scalar
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.map_lookups import MapLookups
 
@@ -70,7 +70,7 @@ def _form_of(item: Constraint, ego: int, chosen: Mapping[Identity, float]) -> Cl
 
 
 def _condition(item: Condition, chosen: Mapping[Identity, float]) -> ClosedForm | None:
-    holds = truth(item.expression, chosen)
+    holds = compile_condition(item.expression, chosen)
     if holds is None:
         return None
     known = {
@@ -78,7 +78,7 @@ def _condition(item: Condition, chosen: Mapping[Identity, float]) -> ClosedForm 
     }
     steps = steps_of(item.expression, known=known)
 
-    def evaluate(get: Get, options: MatchOptions, lookups: MapLookups) -> Evaluated:
+    def evaluate(get: Lookup, options: MatchOptions, lookups: MapLookups) -> Evaluated:
         if isinstance(get, Columns):
             return _of_columns(item.expression, steps, known, get, chosen)
         found = holds(get)
@@ -128,7 +128,7 @@ def _where_alone(forms: Sequence[ClosedForm], ranked: Sequence[tuple[Index, Sele
             return None
         numbers.append(known)
 
-    def alone(get: Get) -> NDArray[np.bool_]:
+    def alone(get: Lookup) -> NDArray[np.bool_]:
         found = np.ones(1, np.bool_)
         for ranks in numbers:
             first, *others = [np.asarray(each(get)) for each in ranks]
@@ -136,7 +136,7 @@ def _where_alone(forms: Sequence[ClosedForm], ranked: Sequence[tuple[Index, Sele
                 found = found & (first == other)
         return found
 
-    def evaluate(get: Get, options: MatchOptions, lookups: MapLookups) -> Evaluated:
+    def evaluate(get: Lookup, options: MatchOptions, lookups: MapLookups) -> Evaluated:
         known = alone(get)
         values: dict[Identity, Value | FloatColumn | list[Value]] = {}
         holds, fails = known, np.zeros(1, np.bool_)

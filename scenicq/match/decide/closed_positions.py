@@ -13,7 +13,7 @@ from scenicq.forest.groups import Comparison
 from scenicq.forest.nodes import Identity, PointIn, Rotate, Value, VectorOf, VectorSum
 from scenicq.match.decide.closed_form import FAILS, ClosedForm, Evaluated, each_position
 from scenicq.match.decide.compiled_expressions import CompiledExpressions
-from scenicq.match.decide.range_forms import Columns, CompiledVector, FloatColumn, Get, Scalar, clip, cos_sin, spread
+from scenicq.match.decide.range_forms import Columns, CompiledVector, FloatColumn, Lookup, Scalar, clip, cos_sin, spread
 from scenicq.match.decide.region_tests import region_test
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.evaluation import unlike
@@ -39,7 +39,7 @@ def point_in(item: Comparison, node: PointIn, ego: int, chosen: Mapping[Identity
     if test is None:
         return None
 
-    def evaluate(get: Get, options: MatchOptions, lookups: MapLookups) -> Evaluated:
+    def evaluate(get: Lookup, options: MatchOptions, lookups: MapLookups) -> Evaluated:
         position = get(index, "position")
         holds, fails = test.evaluate(get, position, lookups, options.tolerance.of(index, "position").reach + SLACK)
         places = each_position(position)
@@ -65,11 +65,11 @@ def known_vector(item: Comparison) -> ClosedForm | None:
         return None
     index, name = item.object, item.property
 
-    def evaluate(get: Get, options: MatchOptions, lookups: MapLookups) -> Evaluated:
+    def evaluate(get: Lookup, options: MatchOptions, lookups: MapLookups) -> Evaluated:
         (x, y), (px, py) = cast(XY, exact(get)), cast(XY, get(index, name))
         return Evaluated(*_close(x - px, y - py, options.tolerance.of(index, name)), {})
 
-    def detail(get: Get, lookups: MapLookups) -> str:
+    def detail(get: Lookup, lookups: MapLookups) -> str:
         return unlike(name, cast(XY, exact(get)), cast(XY, get(index, name)))
 
     return ClosedForm(item, evaluate, detail=detail)
@@ -145,7 +145,7 @@ def offset(item: Comparison) -> ClosedForm | None:
         return None
     index, name = item.object, item.property
 
-    def evaluate(get: Get, options: MatchOptions, lookups: MapLookups) -> Evaluated:
+    def evaluate(get: Lookup, options: MatchOptions, lookups: MapLookups) -> Evaluated:
         px, py = cast(XY, get(index, name))
         margin = options.tolerance.of(index, name)
         turns: list[XY] = []

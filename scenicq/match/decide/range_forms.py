@@ -20,7 +20,7 @@ __all__ = [
     "Exact",
     "FloatColumn",
     "Form",
-    "Get",
+    "Lookup",
     "Scalar",
     "by_option",
     "clip",
@@ -28,17 +28,17 @@ __all__ = [
     "spread",
 ]
 
-Get: TypeAlias = Callable[[int, str], Value]
+Lookup: TypeAlias = Callable[[int, str], Value]
 """The observed value of an object's property."""
 FloatColumn: TypeAlias = NDArray[np.float64]
 """A number of each of many labels; a vector is a pair of columns."""
-Exact: TypeAlias = Callable[[Get], "float | tuple[float, float]"]
-Scalar: TypeAlias = Callable[[Get], float]
-CompiledVector: TypeAlias = Callable[[Get], "tuple[float, float]"]
+Exact: TypeAlias = Callable[[Lookup], "float | tuple[float, float]"]
+Scalar: TypeAlias = Callable[[Lookup], float]
+CompiledVector: TypeAlias = Callable[[Lookup], "tuple[float, float]"]
 
 
 class Columns:
-    """The observed values of many labels at once, in place of a `Get`: formulas of it give columns.
+    """The observed values of many labels at once, in place of a `Lookup`: formulas of it give columns.
 
     Every step is what it is for one label, bit by bit: NumPy adds, subtracts, multiplies and divides; the functions
     that it computes in a way of its own are applied one by one.
@@ -68,7 +68,7 @@ class Columns:
         return Columns(len(which), column)
 
 
-def by_option(number: Scalar, get: Get, size: int) -> Iterator[tuple[int, NDArray[np.intp]]]:
+def by_option(number: Scalar, get: Lookup, size: int) -> Iterator[tuple[int, NDArray[np.intp]]]:
     """The options that a number picks for labels, each with the numbers of those labels.
 
     Args:
@@ -124,7 +124,7 @@ class Form:
         object.__setattr__(self, "low", math.fsum(low for low, _ in products))
         object.__setattr__(self, "high", math.fsum(high for _, high in products))
 
-    def known(self, get: Get) -> float:
+    def known(self, get: Lookup) -> float:
         """The known part."""
         total = self.constant
         for factor, part in self.parts:

@@ -27,7 +27,7 @@ from scenicq.forest.scenario import Scenario
 from scenicq.limits import LIMITS
 from scenicq.match.decide.closed_form import ClosedForm, Evaluated
 from scenicq.match.decide.others_forms import others_form_of
-from scenicq.match.decide.range_forms import Columns, FloatColumn, Get
+from scenicq.match.decide.range_forms import Columns, FloatColumn, Lookup
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import Candidates
 from scenicq.match.problem.constraints import Signature
@@ -329,12 +329,12 @@ class _Batch:
         witnesses = list(zip(*columns, strict=True)) if columns else [()] * size
         return FilledBatch(self.rows, self.numbers, tuple(variables), witnesses)
 
-    def get(self, number: int) -> Get:
+    def get(self, number: int) -> Lookup:
         """The observed values of one label."""
         return _getter(self.rows[number], self.numbers[number], self.fit.ranks)
 
 
-def _getter(row: LabelRow, numbers: tuple[int, ...], ranks: Mapping[int, int]) -> Get:
+def _getter(row: LabelRow, numbers: tuple[int, ...], ranks: Mapping[int, int]) -> Lookup:
     """The observed values of one label."""
     known = row.seen
 
@@ -394,7 +394,7 @@ def _column(
 
 
 def _who(rows: Sequence[LabelRow], playing: Sequence[int], name: str) -> FloatColumn:
-    """Who plays an object, as a number; or the place of its id in its label."""
+    """The number of the label object that plays a role, or the place of its id in its label."""
     if name != RANK:
         return np.array(playing, dtype=np.float64)
     return np.array([
@@ -419,7 +419,7 @@ def _label_object(label: Label, number: int) -> LabelObject:
 
 
 def _following(order: Sequence[int], candidates: Candidates, numbers: tuple[int, ...]) -> tuple[int, ...]:
-    """Who plays the first objects of an order next, after some have; nobody, if all has been tried."""
+    """The next numbers to try for the first roles of an order; () if all have been tried."""
     for length in range(len(numbers) - 1, 0, -1):
         options, taken = candidates[order[length]], numbers[:length]
         for one in options[options.index(numbers[length]) + 1 :]:

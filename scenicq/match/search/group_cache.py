@@ -84,7 +84,7 @@ class GroupCache:
 
         Args:
             group: The group.
-            assignment: Who plays whom.
+            assignment: The label object of each role.
             certain: What is not known of label objects without a role is taken for what breaks a constraint; else for
                 what fulfils it.
 

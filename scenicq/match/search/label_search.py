@@ -367,7 +367,7 @@ class LabelSearch:
         Args:
             plan: The groups.
             slots: The objects with their candidates.
-            ego: Who plays the ego.
+            ego: Number of the label object that plays the ego.
             twins: For an object, an earlier one that is interchangeable with it.
             accept_unknown: Whether groups may be undecided.
             budget: Steps; what the options say if not given.

@@ -20,11 +20,11 @@ from scenicq.match.verdict import Cause, Match, NoMatch, Unknown, Verdict, Witne
 from scenicq.query.execution.recording_starts import (
     DecidedStart,
     NearestRoles,
-    few_findings,
-    label_of,
-    nearest_roles,
+    decided_starts,
+    find_starts,
+    make_start_label,
+    order_by_distance,
     start_table,
-    starts_of,
 )
 from scenicq.query.execution.results import IntervalSpan, Result
 from scenicq.query.prefilter.executor import Block
@@ -219,10 +219,10 @@ class RecordingMatcher:
                 if number in by_number:
                     return by_number[number].label, by_number[number].correspondence
                 members = {index: int(mine[number]) for index, mine in table.members.items()}
-                return label_of(self.matcher.scenario, block, members, rows.map, self._relevant)
+                return make_start_label(self.matcher.scenario, block, members, rows.map, self._relevant)
 
             def label(scenario: Scenario, members: Mapping[int, int], relevant: Sequence[frozenset[str]]) -> Remembered:
-                return label_of(scenario, block, members, rows.map, relevant)
+                return make_start_label(scenario, block, members, rows.map, relevant)
 
             reported = self.intervals.intervals(table, remember, every=self.every, label=label)
             look()
@@ -284,11 +284,11 @@ class RecordingMatcher:
             matcher = search.rest if known else search.matcher
             label = candidate.label
             recording = int(block.recording_of[at])
-            findings = few_findings(matcher, label, known_starts.setdefault(recording, Counter()), among=among)
+            findings = find_starts(matcher, label, known_starts.setdefault(recording, Counter()), among=among)
             for each in findings:
                 if isinstance(each.verdict, NoMatch):
                     found.failed[each.verdict.cause.what] += 1
-            for start in starts_of(self.matcher.scenario, block, label, members, findings):
+            for start in decided_starts(self.matcher.scenario, block, label, members, findings):
                 if isinstance(start, Unknown):
                     undecided[at] = start
                 else:
@@ -345,7 +345,7 @@ class RecordingMatcher:
         """Intervals as results, with the recordings that they are of: by time, then the nearest first."""
         scenario, table = self.matcher.scenario, starts.table
         origins = np.array([each.origin for each in intervals], dtype=np.int64)
-        told = nearest_roles(scenario, table, self.matcher.plans.always_twins, origins)
+        told = order_by_distance(scenario, table, self.matcher.plans.always_twins, origins)
         order = sorted(
             range(len(told)),
             key=lambda n: (intervals[n].recording, intervals[n].start, intervals[n].end, told[n].place),
@@ -398,7 +398,7 @@ class RecordingMatcher:
         among = {index: (number,) for number, index in enumerate(others, 1)}
         for outcome, numbers in rest.items():
             found = [
-                label_of(scenario, starts.table.block, wanted[each].members, rows.map, self._relevant)
+                make_start_label(scenario, starts.table.block, wanted[each].members, rows.map, self._relevant)
                 for each in numbers
             ]
             labels = [(label, among) for label, _ in found]

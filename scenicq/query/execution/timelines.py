@@ -18,7 +18,7 @@ from scenicq.forest.walk import leaves
 from scenicq.match.options import MatchOptions
 from scenicq.match.verdict import Match, WitnessValue
 from scenicq.query.execution.members import Members, fill_by_recording
-from scenicq.query.execution.recording_starts import label_of
+from scenicq.query.execution.recording_starts import make_start_label
 from scenicq.query.execution.result_samples import ResultSamples, ResultStretches, assignment_of
 from scenicq.query.execution.results import ModeRecord, ProgramPlace, Result
 from scenicq.store.dataset import Dataset
@@ -169,7 +169,7 @@ class Timelines:
             def label(
                 scene: Scenario, members: Mapping[int, int], relevant: Sequence[frozenset[str]]
             ) -> tuple[Label, Mapping[str, str]]:
-                return label_of(scene, block, members, self.map_name, relevant)
+                return make_start_label(scene, block, members, self.map_name, relevant)
 
             found.update(variant.arrivals.truths(own.samples.at(own.places()), own.bounds(), label))
         return found

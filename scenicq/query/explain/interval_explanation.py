@@ -15,7 +15,7 @@ from scenicq.match.matcher import Matcher
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown, Verdict
 from scenicq.query.execution.interval_frames import locate
 from scenicq.query.execution.recording_matcher import CUT_OFF
-from scenicq.query.execution.recording_starts import DecidedStart, few_findings, start_table, starts_of
+from scenicq.query.execution.recording_starts import DecidedStart, decided_starts, find_starts, start_table
 from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query
 from scenicq.query.explain.bands import Band, bands_of, columns_of, conditions_over, show_bands
@@ -228,8 +228,8 @@ def _explain_variant(
             unknown: list[str] = []
             before = len(starts)
             for outcome, matcher in enumerate(matchers):
-                findings = few_findings(matcher, label, known)
-                found = [*starts_of(scenario, block, label, members, findings)]
+                findings = find_starts(matcher, label, known)
+                found = [*decided_starts(scenario, block, label, members, findings)]
                 starts += [(each, outcome) for each in found if isinstance(each, DecidedStart)]
                 unknown = [each.reason for each in found if isinstance(each, Unknown)] or unknown
                 causes += [each.verdict.cause.what for each in findings if not isinstance(each.verdict, Match)]
