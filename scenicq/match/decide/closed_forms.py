@@ -90,7 +90,7 @@ def _condition_form(item: Condition, chosen: Mapping[Identity, float]) -> Closed
 def _evaluate_columns(
     root: Node, steps: Steps, known: Mapping[int, Column], get: Columns, chosen: Mapping[Identity, float]
 ) -> Evaluated:  # fmt: skip
-    """Evaluate a condition for many labels; it neither holds nor fails where it has no value, or rounding may decide."""
+    """Evaluate a condition for many labels; it neither holds nor fails where it is undefined or rounding may decide."""
 
     def observed(node: Feature) -> Column:
         return Column(cast("NDArray[np.float64]", get(node.object, node.property)), np.full(1, DEFINED))
