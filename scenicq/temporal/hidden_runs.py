@@ -22,7 +22,7 @@ from scenicq.temporal.atoms import AtomColumns, UnclearVariable
 from scenicq.temporal.hidden import value_between
 from scenicq.temporal.hidden_bounds import PossibleValues
 from scenicq.temporal.hidden_conditions import HiddenConditions
-from scenicq.temporal.hidden_examples import Example, Examples, InitialScene, Remembered
+from scenicq.temporal.hidden_examples import Example, Examples, InitialScene, StartLabel
 from scenicq.temporal.outcomes import place_of
 from scenicq.temporal.run_lanes import follow_runs
 from scenicq.temporal.run_machine import RunMachine
@@ -30,7 +30,7 @@ from scenicq.temporal.runs import Runs
 from scenicq.temporal.stretches import Stretches
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
-__all__ = ["HiddenRuns", "Remembered"]
+__all__ = ["HiddenRuns", "StartLabel"]
 
 Numbers = NDArray[np.float64]
 _THIN = 4e-12
@@ -63,7 +63,7 @@ class HiddenRuns:
 
     def follow(
         self, stretches: Stretches, columns: AtomColumns, expanded: Sequence[Node],
-        remember: Callable[[int], Remembered],
+        remember: Callable[[int], StartLabel],
     ) -> Runs:  # fmt: skip
         """What becomes of the runs from all starts: the best that any values make of each first, then others.
 
@@ -89,7 +89,7 @@ class HiddenRuns:
 
     def _of_stretch(
         self, stretch: Stretches, columns: AtomColumns, expanded: Sequence[Node],
-        remember: Callable[[int], Remembered],
+        remember: Callable[[int], StartLabel],
     ) -> Runs:  # fmt: skip
         """The runs of one stretch."""
         try:
@@ -108,7 +108,7 @@ class HiddenRuns:
 
     def _by_values(
         self, stretches: Stretches, columns: AtomColumns, expanded: Sequence[Node],
-        remember: Callable[[int], Remembered],
+        remember: Callable[[int], StartLabel],
     ) -> Runs:  # fmt: skip
         """The runs by the values of hidden numbers."""
         hidden = HiddenConditions(columns, expanded)
@@ -129,7 +129,7 @@ class HiddenRuns:
 
     def _within(
         self, stretches: Stretches, columns: AtomColumns, expanded: Sequence[Node],
-        remember: Callable[[int], Remembered], hidden: HiddenConditions, possible: tuple[Numbers, Numbers] | None,
+        remember: Callable[[int], StartLabel], hidden: HiddenConditions, possible: tuple[Numbers, Numbers] | None,
     ) -> Runs:  # fmt: skip
         """The runs by those values of hidden numbers with which they may match, or by all."""
         pieces = follow_runs(self.machine, stretches, columns.reader(expanded), hidden, possible)
@@ -178,7 +178,7 @@ class HiddenRuns:
                 pieces.truth[each] = FALSE
 
     def _by_examples(
-        self, one: Stretches, columns: AtomColumns, expanded: Sequence[Node], start: Remembered, unclear: str
+        self, one: Stretches, columns: AtomColumns, expanded: Sequence[Node], start: StartLabel, unclear: str
     ) -> Runs:
         """The matches of a start by what its label says of the variables, the longest first, else why there is none."""
         hanging = {number: each for number, each in enumerate(expanded) if any(True for _ in leaves(each))}
@@ -213,7 +213,7 @@ class HiddenRuns:
 
     def _again(
         self, pieces: Runs, order: NDArray[np.int64], firsts: NDArray[np.int64], hidden: HiddenConditions,
-        joint: Sequence[int], stretches: Stretches, remember: Callable[[int], Remembered],
+        joint: Sequence[int], stretches: Stretches, remember: Callable[[int], StartLabel],
     ) -> Runs:  # fmt: skip
         """Match starts again with the values of random variables that the initial scene has, too.
 
@@ -246,7 +246,7 @@ class HiddenRuns:
         return runs.some(np.argsort(runs.owner, kind="stable"))
 
     def _jointly(
-        self, start: Remembered, pieces: Runs, group: NDArray[np.int64], hidden: HiddenConditions, joint: Sequence[int]
+        self, start: StartLabel, pieces: Runs, group: NDArray[np.int64], hidden: HiddenConditions, joint: Sequence[int]
     ) -> Runs:
         """The best runs of a start, given its pieces in order."""
         undecided: Runs | None = None

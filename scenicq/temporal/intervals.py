@@ -32,7 +32,7 @@ from scenicq.temporal.arrivals import Arrivals, LabelOf
 from scenicq.temporal.atoms import AtomColumns, reads_start
 from scenicq.temporal.hidden import random_variables
 from scenicq.temporal.hidden_examples import InitialScene
-from scenicq.temporal.hidden_runs import HiddenRuns, Remembered
+from scenicq.temporal.hidden_runs import HiddenRuns, StartLabel
 from scenicq.temporal.interval_options import IntervalOptions
 from scenicq.temporal.outcomes import Outcome, outcomes_of, steady_value
 from scenicq.temporal.presence import group_by_observed
@@ -159,7 +159,7 @@ class IntervalMatcher:
         return TrackReach(limit_s, self.options.gap_s) if limit_s is not None and moving else None
 
     def intervals(
-        self, table: StartTable, remember: Callable[[int], Remembered], *, every: bool = True,
+        self, table: StartTable, remember: Callable[[int], StartLabel], *, every: bool = True,
         label: LabelOf | None = None,
     ) -> Reported:  # fmt: skip
         """What became of each binding: the intervals to report, or else the one that came furthest.
@@ -187,7 +187,7 @@ class IntervalMatcher:
             own = table.chosen(which)
             program = _Program(InitialScene(self.outcomes[outcome].scenario, self.match, self.solver))
 
-            def remembered(number: int, which: NDArray[np.int64] = which) -> Remembered:
+            def remembered(number: int, which: NDArray[np.int64] = which) -> StartLabel:
                 return remember(int(order[which[number]]))
 
             for stretches in stretches_of(own, self.options.gap_s, apart=program.apart, classes=self.match.classes):
@@ -210,7 +210,7 @@ class IntervalMatcher:
         return Reported(found, len(table))
 
     def _followed(
-        self, program: _Program, stretches: Stretches, table: StartTable, remember: Callable[[int], Remembered]
+        self, program: _Program, stretches: Stretches, table: StartTable, remember: Callable[[int], StartLabel]
     ) -> Iterator[tuple[Stretches, Runs]]:
         """The runs of some stretches, those together in which the same features are observed."""
         dynamics = program.scenario.dynamics
@@ -229,7 +229,7 @@ class IntervalMatcher:
 
     def _dynamic(
         self, program: _Program, stretches: Stretches, columns: AtomColumns, expanded: Sequence[Node],
-        remember: Callable[[int], Remembered],
+        remember: Callable[[int], StartLabel],
     ) -> Runs:  # fmt: skip
         assert program.machine is not None
         if random_variables(expanded):

@@ -33,7 +33,7 @@ from scenicq.store.classes import class_matches
 from scenicq.store.dataset import Dataset
 from scenicq.store.track_block import TrackBlock
 from scenicq.store.tracks import TrackKey
-from scenicq.temporal.hidden_runs import Remembered
+from scenicq.temporal.hidden_runs import StartLabel
 from scenicq.temporal.intervals import IntervalMatcher, IntervalVerdict
 from scenicq.temporal.necessary import NecessaryConditions
 from scenicq.temporal.outcomes import Outcome
@@ -215,13 +215,13 @@ class RecordingMatcher:
                 starts = self._by_outcomes(asked, starts)
             table, by_number, undecided = starts.table, starts.decided, starts.undecided
 
-            def remember(number: int) -> Remembered:
+            def remember(number: int) -> StartLabel:
                 if number in by_number:
                     return by_number[number].label, by_number[number].correspondence
                 members = {index: int(mine[number]) for index, mine in table.members.items()}
                 return make_start_label(self.matcher.scenario, block, members, rows.map, self._relevant)
 
-            def label(scenario: Scenario, members: Mapping[int, int], relevant: Sequence[frozenset[str]]) -> Remembered:
+            def label(scenario: Scenario, members: Mapping[int, int], relevant: Sequence[frozenset[str]]) -> StartLabel:
                 return make_start_label(scenario, block, members, rows.map, relevant)
 
             reported = self.intervals.intervals(table, remember, every=self.every, label=label)
