@@ -330,7 +330,7 @@ class Examples:
         return True
 
     def _state(self, number: int, sample: int, *, holds: bool) -> Node | None:
-        """State for the matcher that a condition holds at a sample, or that it does not; None if it cannot be stated."""
+        """State for the matcher that a condition holds at a sample, or fails there; None if it cannot be stated."""
 
         def observed(node: Node) -> Node:
             # what is read at the start is observed by the label
