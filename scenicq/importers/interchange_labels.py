@@ -15,7 +15,7 @@ from scenicq.geometry.angles import normalize_array
 from scenicq.geometry.camera import Camera
 from scenicq.importers import fields
 from scenicq.importers.base import ClassNames
-from scenicq.importers.cameras import camera_of
+from scenicq.importers.cameras import read_camera
 from scenicq.importers.ego_choice import middle
 from scenicq.importers.fields import NO_MAP, InvalidError, whole
 from scenicq.importers.recording_checks import radians
@@ -270,7 +270,7 @@ class LabelLines:
             _KNOWN.count_rows((record,), self._report, "labels/sensors/*")
             path, camera = fields.text(record, "path"), None
             try:
-                camera = camera_of(record)
+                camera = read_camera(record)
             except InvalidError as error:
                 message = f"{place}: camera `{channel}` of label `{line.id}`: {error}"
                 self._report.leave_out("camera", "record-invalid", message)
