@@ -76,7 +76,7 @@ class TableWriter:
             self._flush(self._pending_rows // _ROW_GROUP * _ROW_GROUP)
 
     def end_group(self, least: int) -> None:
-        """Let a row group end here, if it has so many rows: whoever looks for what follows reads no more than that.
+        """Let a row group end here, if it has so many rows: a search for what follows reads no more than that.
 
         Args:
             least: The fewest rows of a row group.
