@@ -83,6 +83,7 @@ CODES: dict[str, str] = {
     "resources-exhausted": "the system gives no more memory, files or processes",
     "deadline-passed": "the time that a run may take was over before all frames were decided, or a scene drawn",
     "results-incomplete": "results do not say of every frame whether it matches, or nobody knows whether they do",
+    "results-version": "results were written by a newer version",
     "ranking-cut": "a ranking has not looked at all that may be among the closest",
     "predictions-invalid": "a predicted box has a value that makes no sense",
     "predictions-doubtful": "predictions look like a placeholder, or their benchmark's own evaluation refuses them",

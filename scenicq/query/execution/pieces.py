@@ -23,7 +23,7 @@ from msgspec import Struct
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.query.execution.records import Record, SummaryRecord, decode_record, json_text
-from scenicq.query.execution.result_summary import ResultCount, ResultSummary, join_summaries
+from scenicq.query.execution.result_summary import ResultCount, ResultSummary, join_summaries, refuse_newer
 from scenicq.query.execution.results import Funnel
 from scenicq.query.execution.run import Query, QueryOptions, RecordingRange
 from scenicq.query.execution.skipped_frames import summarize
@@ -191,6 +191,7 @@ def _piece(path: AnyPath) -> _Piece:
     """The results in a file, and what was counted."""
     try:
         *lines, last = path.read_bytes().splitlines() or [b""]
+        refuse_newer(str(path), last)
         counts = msgspec.json.decode(last, type=_Counts)
         there = (*_COUNTS, *(name for name in _LATER if name in counts.funnel))
         funnel = Funnel(**{name: _counted(counts.funnel[name]) for name in there})
@@ -214,7 +215,8 @@ def gather(folder: AnyPath, question: str | None = None, *, only: int | None = N
         only: The number of a single piece, from 0; all of them by default.
 
     Raises:
-        DataError: file-missing, naming the pieces that are missing; file-invalid for pieces of several questions.
+        DataError: file-missing, naming the pieces that are missing; file-invalid for pieces of several questions;
+            results-version for those that a newer program wrote.
     """
     found = _files(folder)
     questions = sorted({path.name.rsplit("-", 3)[0] for path in found})
