@@ -9,9 +9,9 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from scenicq.store.atomic_files import sync_folder
 from scenicq.store.manifest import Part
 from scenicq.store.schema import GEO_METADATA, SCHEMA_VERSION, SCHEMAS, ArrowTable
+from scenicq.store.targets import sync_folder
 
 __all__ = ["TableWriter", "part_path"]
 

@@ -27,9 +27,10 @@ from scenicq.query.execution.result_summary import ResultCount, ResultSummary, j
 from scenicq.query.execution.results import Funnel
 from scenicq.query.execution.run import Query, QueryOptions, RecordingRange
 from scenicq.query.execution.skipped_frames import summarize
-from scenicq.store.atomic_files import made_folder, whole_file
+from scenicq.store.atomic_files import whole_file
 from scenicq.store.dataset import Dataset
 from scenicq.store.remote_path import AnyPath
+from scenicq.store.targets import target_of
 
 __all__ = ["DatasetPiece", "Gathered", "find_finished", "fingerprint", "gather", "partitions", "write_piece"]
 
@@ -134,7 +135,7 @@ def write_piece(
     """
     target = folder / _name(question, piece.number, piece.count)
     try:
-        with made_folder(folder), whole_file(target) as file:
+        with target_of(folder).made_folder(), whole_file(target) as file:
             counted = ResultCount()
             for each in counted.counted(records):
                 file.write((json_text(each) + "\n").encode())
