@@ -84,9 +84,10 @@ def test_a_parameter_is_a_change_too(dataset):
 
 
 def test_large_datasets_are_sampled(dataset, monkeypatch):
-    monkeypatch.setattr(LIMITS, "advice_frames", 10)
+    monkeypatch.setattr(LIMITS, "advice_frames", 100)
     query = taken(dataset, TEXT)
     assert not any(each.sampled for each in advice(query).outlooks)  # where the sample is all there is
+    monkeypatch.setattr(LIMITS, "advice_frames", 10)
     found = advice(query)
     assert found.outlooks
     assert all(each.sampled for each in found.outlooks)
