@@ -26,9 +26,10 @@ from scenicq.match.verdict import Match, Unknown
 from scenicq.query.execution.interval_frames import frames_of
 from scenicq.query.execution.result_summary import ResultSummary
 from scenicq.query.execution.results import Result
-from scenicq.store.atomic_files import check_writable, is_taken, whole_folder
+from scenicq.store.atomic_files import whole_folder
 from scenicq.store.dataset import Dataset
 from scenicq.store.remote_path import AnyPath
+from scenicq.store.targets import target_of
 
 __all__ = ["EXPORTS", "ExportSummary", "Exporter"]
 
@@ -82,12 +83,12 @@ class Exporter:
             message = f"an export `{self.kind}` needs a dataset from {wanted}, this one is from {importer}"
             hint = "`interchange`, `openlabel` and `paths` suit every dataset"
             raise DataError(Diagnostic("option-invalid", message, hints=(hint,)))
-        if is_taken(self.target):
+        if target_of(self.target).is_taken():
             hint = "choose another name: an export never replaces anything"
             raise DataError(Diagnostic("target-exists", f"{self.target} exists", hints=(hint,)))
         if not self.target.name or self.target.name == "..":
             raise DataError(Diagnostic("target-unwritable", f"{self.target} is not the name of a new folder"))
-        check_writable(self.target)
+        target_of(self.target).check_writable()
 
     def add(self, result: Result) -> None:
         """Take a result; those that are no match are passed over, of several of one frame the first counts.
