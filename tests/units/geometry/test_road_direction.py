@@ -243,7 +243,9 @@ def test_a_step_along_a_lane_is_found_backwards(field: RoadDirection, seed: int)
         assert np.allclose(again, ends[place], atol=1e-9), "each leads to where it is asked for"
         for n, (x, y) in enumerate(begin[owner].tolist()):
             # beside lanes a way may begin where the nearest lane's direction is: that is not looked for
-            within = any(area.covers(Point(x, y)) for area in paved)
+            at = [lane for lane in field.lanes if lane.area.covers(Point(x, y))]
+            # far from a lane's middle no way is looked for either
+            within = at and all(LineString(lane.centerline[0]).distance(Point(x, y)) < 3 for lane in at)
             free = one is followed and turns[n] == OFF_ROAD and all(area.distance(Point(x, y)) > 0.06 for area in paved)
             if within or free:
                 mine = place == n

@@ -89,7 +89,7 @@ def place_of(**changes: Any) -> Callable[[dict[str, Any]], object]:
         (lambda label: label.pop("ego"), "label", "`ego` is missing"),
         (lambda label: label["ego"].pop("heading"), "label", "ego: `heading` is missing"),
         (lambda label: label.pop("objects"), "label", "`objects` is missing"),
-        (lambda label: label.update(timestamp_us=1.5), "label", "`timestamp_us` is not a whole number"),
+        (lambda label: label.update(timestamp_us=1.5), "label", "`timestamp_us` is 1.5, which is not a whole number"),
         (lambda label: label.update(timestamp_us=10**30), "label", "`timestamp_us` is out of range"),
         (lambda label: label.update(id="01-quiet-street/00"), "label", "label id `01-quiet-street/00` is used twice"),
         (lambda label: label.update(timestamp_us=1700000000000000), "label", "has the time of label"),
