@@ -105,7 +105,9 @@ def sufficient_conditions(
     found = list(_without_attributes(scenario, options, [a - b for a, b in zip(relevant, told, strict=True)]))
     signature = (*told, frozenset[str]())
     for group in build_groups(scenario, signature, options):
-        found += _proof(group, reader, scenario, options.classes)
+        # what is known up to two ends must hold whichever it is
+        surely = replace(group, constraints=group.certain) if group.doubtful else group
+        found += _proof(surely, reader, scenario, options.classes)
     if any(each.sql is False for each in found):
         return None
     return tuple(each for each in found if each.region or each.sql is not True)

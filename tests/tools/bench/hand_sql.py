@@ -124,6 +124,13 @@ AND turned(a.relative_heading, radians({middle})) <= radians(25)"""
     return _driving(program, sql)
 
 
+_ON_COURSE = (
+    "a.ego_along - a.ego_along_less > {} AND a.ego_along + a.ego_along_more < {} "
+    "AND greatest(abs(a.ego_beside - a.ego_beside_less), abs(a.ego_beside + a.ego_beside_more)) < {}"
+)
+"""That a label object is surely along the ego's course by so much, and beside it by less than so much."""
+
+
 QUESTIONS = {
     "01_pedestrian_facing_ego": _sample(
         "01_pedestrian_facing_ego",
@@ -346,6 +353,33 @@ near AS (SELECT frame FROM ego WHERE EXISTS (FROM crossing WHERE off(ego_x, ego_
 SELECT DISTINCT a.frame FROM objects a JOIN near USING (frame)
 WHERE a.class = 'Car' AND a.ego_distance < 20 AND along(a.heading, a.road_directions, radians(5))
 AND {_near("a.frame", "a.id", DRIVABLE)}""",
+    ),
+    "ahead on the course": _driving(
+        "from scenicq.labels import along, beside\n"
+        "lead = new Car in everywhere, facing Range(-180, 180) deg\n"
+        "require 0 < along(ego, lead) < 20\nrequire abs(beside(ego, lead)) < 1.5",
+        f"""
+SELECT DISTINCT a.frame FROM objects a JOIN ego USING (frame)
+WHERE a.class = 'Car' AND a.ego_distance <= 50 AND {_ON_COURSE.format(0, 20, 1.5)}""",
+    ),
+    "a lead that drives": _driving(
+        "from scenicq.labels import along, beside\n"
+        "lead = new Truck in everywhere, facing Range(-30, 30) deg relative to ego.heading\n"
+        "require 5 < along(ego, lead) < 30\nrequire abs(beside(ego, lead)) < 1.5\nrequire lead.speed > 2",
+        f"""
+SELECT DISTINCT a.frame FROM objects a JOIN ego USING (frame)
+WHERE a.class = 'Truck' AND a.ego_distance <= 50 AND {_ON_COURSE.format(5, 30, 1.5)}
+AND abs(a.relative_heading) <= radians(35) AND sqrt(a.motion_vx ** 2 + a.motion_vy ** 2) > 2""",
+    ),
+    "nobody on the course": _driving(
+        "from scenicq.labels import along, beside, others\n"
+        "require not any(0 < along(ego, c) < 30 and abs(beside(ego, c)) < 2 for c in others(Car))",
+        """
+SELECT frame FROM ego WHERE frame NOT IN (
+    SELECT frame FROM objects a WHERE a.class = 'Car'
+    AND coalesce(a.ego_along + a.ego_along_more > 0, true) AND coalesce(a.ego_along - a.ego_along_less < 30, true)
+    AND coalesce(a.ego_beside + a.ego_beside_more > -2, true)
+    AND coalesce(a.ego_beside - a.ego_beside_less < 2, true))""",
     ),
     "nobody near": _driving(
         "from scenicq.labels import others\nrequire not any((distance to c) < 15 for c in others(Car))",
