@@ -108,5 +108,6 @@ def links_of(features: Sequence[MapFeature]) -> Iterator[Link]:
 
 def _region(element: NetworkElement) -> str:
     """What the map calls an element's area: that of a lane that is not cut is that of its only section, too."""
-    uncut = isinstance(element, LaneSection) and element.properties is element.lane.properties
-    return element.lane.id if uncut else element.id
+    if isinstance(element, LaneSection) and element.properties is element.lane.properties:
+        return element.lane.id
+    return element.id

@@ -174,8 +174,9 @@ def _meant_elements(group: Group, ego: int) -> MeantElements | None:
     found += [place for places in equations for place in places]
     allowed = [known for each in said if (known := allowed_elements(each))]
     # that there is what leads to another is said by what is said of the other
-    there = [*found, *(one for one, numbers in allowed if numbers == {0})]
-    allowed = [each for each in allowed if each[1] != {0} or not any(each[0].leads_to(other) for other in there)]
+    some = frozenset({0})
+    there = [*found, *(one for one, numbers in allowed if numbers == some)]
+    allowed = [each for each in allowed if each[1] != some or not any(each[0].leads_to(other) for other in there)]
     found += [look_up for look_up, _ in allowed]
     if not found:
         return None
