@@ -1,9 +1,5 @@
 """`scenicq evaluate`: a model's detections on the frames of a scenario, against other frames."""
 
-# pyarrow has no type stubs.
-# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
-# pyright: reportUnknownArgumentType=false
-
 from __future__ import annotations
 
 import io

@@ -3,16 +3,12 @@
 Every export is a folder that appears when it is complete; elsewhere its last file does.
 """
 
-# pyarrow has no type stubs.
-# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
-
 from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
-from typing import Any
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -164,9 +160,9 @@ def _argoverse2(export: Exporter, folder: Path, problems: list[Diagnostic]) -> N
         for role, track in each.roles.items()
     ]
     names = ("log_id", "timestamp_ns", "track_uuid", "role")
-    kinds: tuple[Any, ...] = (pa.string(), pa.int64(), pa.string(), pa.string())
-    arrays: list[Any] = [pa.array([row[number] for row in rows], kind) for number, kind in enumerate(kinds)]
-    table: Any = pa.table(arrays, names=list(names))
+    kinds = (pa.string(), pa.int64(), pa.string(), pa.string())
+    arrays = [pa.array([row[number] for row in rows], kind) for number, kind in enumerate(kinds)]
+    table = pa.table(arrays, names=list(names))
     feather.write_feather(table, str(folder / "matches.feather"), compression="uncompressed")
     pq.write_table(table, folder / "matches.parquet")
     _write_lines(folder / "logs.txt", list(dict.fromkeys(each.recording for each in export.matched.values())))

@@ -5,10 +5,6 @@ neighbouring lines; whoever reads a recording jumps there. Files in which one ca
 unpacked into a scratch folder.
 """
 
-# pyarrow has no type stubs.
-# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
-# pyright: reportUnknownArgumentType=false
-
 from __future__ import annotations
 
 import gzip

@@ -62,8 +62,8 @@ class TableWriter:
             self._schema,
             compression="zstd",
             # A dictionary of floats only costs: they hardly repeat. Splitting their bytes compresses better.
-            use_dictionary=texts,  # pyright: ignore[reportArgumentType]
-            use_byte_stream_split=reals,  # pyright: ignore[reportArgumentType]
+            use_dictionary=texts,
+            use_byte_stream_split=reals,
         )
 
     def add(self, rows: ArrowTable) -> None:

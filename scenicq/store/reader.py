@@ -175,7 +175,7 @@ def _values(table: ArrowTable, name: str) -> list[Any]:
     is_json = name.endswith(("attributes", "params"))
     if name not in table.column_names:
         return [{} if is_json else None] * len(table)
-    column: Any = table[name]
+    column = table[name]
     if column.null_count == len(column):
         return [{} if is_json else None] * len(column)
     if is_json and not pa.types.is_dictionary(column.type):

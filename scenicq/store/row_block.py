@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
 from itertools import pairwise
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from scenicq.store.place import StoreFile, open_parquet
@@ -46,7 +47,7 @@ class RowBlock:
         self._starts = np.cumsum([0, *sizes])
         leaves = self._metadata.schema
         self._leaf = {leaves.column(number).path: number for number in range(len(leaves))}
-        self._texts: dict[tuple[str, int], Any] = {}
+        self._texts: dict[tuple[str, int], pa.ChunkedArray] = {}
         self._decoded: tuple[int, ArrowTable] | None = None
 
     def __enter__(self) -> RowBlock:
@@ -133,20 +134,20 @@ class RowBlock:
                 places = slice(first, last + 1) if together else rows[low:high] - self._starts[group]
                 yield group, slice(low, high), places
 
-    def _column(self, name: str, group: int) -> Any:
+    def _column(self, name: str, group: int) -> pa.ChunkedArray:
         return self._read([name], group)[name]
 
     def _read(self, columns: list[str], group: int) -> ArrowTable:
         # the threads of pyarrow share columns among them
         return self._file.read_row_group(group, columns=columns, use_threads=len(columns) > 1)
 
-    def _statistics(self, name: str, group: int) -> Any:
+    def _statistics(self, name: str, group: int) -> pq.Statistics | None:
         """What the file says of a column of a group; None if it does not say all."""
         found = self._metadata.row_group(group).column(self._leaf[name]).statistics
         return found if found is not None and found.has_null_count else None
 
 
-def _coded(texts: Any, numbers: dict[str, int]) -> NDArray[np.int32]:
+def _coded(texts: pa.Array, numbers: dict[str, int]) -> NDArray[np.int32]:
     """The numbers of texts with a dictionary, whose texts get numbers; -1 for null."""
     own = [numbers.setdefault(text, len(numbers)) for text in texts.dictionary.to_pylist()]
     indices = texts.indices.to_numpy(zero_copy_only=False)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
 import numpy as np
+import pyarrow as pa
 from numpy.typing import NDArray
 
 from scenicq.geometry.driven_courses import CoursePlace
@@ -163,6 +164,6 @@ class TrackReader:
         )
 
 
-def _reals(column: Any) -> Numbers:
+def _reals(column: pa.ChunkedArray) -> Numbers:
     """Null becomes nan."""
     return column.to_numpy().astype(np.float64)

@@ -1,9 +1,5 @@
 """The files that `scenicq match -o` writes, read back: JSON lines, CSV or Parquet, by the extension."""
 
-# pyarrow has no type stubs.
-# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
-# pyright: reportUnknownArgumentType=false
-
 from __future__ import annotations
 
 import csv
@@ -170,7 +166,7 @@ def _of_csv(path: AnyPath, text: str) -> Iterator[Record | SummaryRecord]:
 def _summaries(text: str) -> Iterator[str]:
     """The summaries in a file of CSV: one, unless files have been put together."""
     rows = csv.reader(io.StringIO(text, newline=""), strict=True)
-    header = next(rows, [])
+    header = next(rows, list[str]())
     if "summary" in header:
         place = header.index("summary")
         yield from (row[place] for row in rows if len(row) > place and row[place])

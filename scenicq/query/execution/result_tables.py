@@ -12,10 +12,6 @@ timeline         list     what roles do from when to when: kind, of, mode (what,
 The dataset and the summary stand in the metadata.
 """
 
-# pyarrow has no type stubs.
-# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
-# pyright: reportUnknownArgumentType=false, reportUnknownParameterType=false
-
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
