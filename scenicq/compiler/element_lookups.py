@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from typing import Literal, TypeAlias, cast
 
 from shapely.geometry import Polygon
@@ -11,7 +12,13 @@ from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.forest.nodes import ArithmeticOp, Constant, DirectionAt, Feature, Index, Node, Select
 from scenicq.geometry import shapes
-from scenicq.geometry.abstract_map import AbstractElement, AbstractNetwork, AbstractOccupancy, NeedsMapError
+from scenicq.geometry.abstract_map import (
+    AbstractElement,
+    AbstractNetwork,
+    AbstractOccupancy,
+    LinkedFrom,
+    NeedsMapError,
+)
 from scenicq.geometry.elements import Intersection, Lane, Maneuver, NetworkElement
 from scenicq.geometry.network import Network
 from scenicq.geometry.occupancy import TOLERANCE, ElementAtPoint, Layer, Occupancy
@@ -105,14 +112,17 @@ LOOKUPS: dict[str, tuple[str, Callable[[Network], list[list[LookupEntry]]]]] = {
 """The look-ups of the network: which ranks they share, and the elements in the order in which they count."""
 
 
-_OWN_AREAS = {
-    "laneAt": "lane",
-    "intersectionAt": "intersection",
-    "crossingAt": "crossing",
-    "sidewalkAt": "sidewalk",
-    "shoulderAt": "shoulder",
+_FOUND_IN: dict[str, tuple[str, tuple[LinkedFrom, ...]]] = {
+    "laneAt": ("lane", (LinkedFrom("lane"),)),
+    "laneSectionAt": ("lane_section", (LinkedFrom("lane_section"),)),
+    "laneGroupAt": ("lane_group", (LinkedFrom("lane", ("group",)), LinkedFrom("lane_group"))),
+    "roadAt": ("road", (LinkedFrom("lane", ("road",)), LinkedFrom("road"))),
+    "intersectionAt": ("intersection", (LinkedFrom("intersection"),)),
+    "crossingAt": ("crossing", (LinkedFrom("crossing"),)),
+    "sidewalkAt": ("sidewalk", (LinkedFrom("sidewalk"),)),
+    "shoulderAt": ("shoulder", (LinkedFrom("shoulder"),)),
 }
-"""The look-ups of elements of one kind that are found in their own areas, and nowhere else."""
+"""The look-ups of elements of one kind: the kind, and the elements at a place that lead to them, as in `LOOKUPS`."""
 
 
 class LookupTable:
@@ -142,12 +152,23 @@ class LookupTable:
         called = f"network.{name}"
         if not isinstance(network, AbstractNetwork):
             return cls.of_layers(called, family, layers(network))
-        if name not in _OWN_AREAS:
+        if name not in _FOUND_IN:
             raise NeedsMapError
-        kind = _OWN_AREAS[name]
-        # each place has one of its own
-        options = (AbstractElement(kind),) if kind in network.kinds else ()
-        return cls(family, options, AbstractOccupancy(called, kind))
+        kind, starts = _FOUND_IN[name]
+        return cls.of_any(AbstractOccupancy(called, kind, starts), family, network)
+
+    @classmethod
+    def of_any(cls, found: AbstractOccupancy, family: str, network: Network) -> LookupTable:
+        """That of one element that stands for all.
+
+        Args:
+            found: Where it lies.
+            family: Which look-ups share ranks with it.
+            network: The abstract map.
+        """
+        # each place has one of its own; a lane that is not cut is its own section
+        there = ("lane" if found.kind == "lane_section" else found.kind) in network.kinds
+        return cls(family, (AbstractElement(found),) if there else (), found)
 
     @classmethod
     def of_layers(cls, name: str, family: str, layers: list[list[LookupEntry]]) -> LookupTable:
@@ -185,6 +206,25 @@ class LookupTable:
         return cls(family, options, occupancy)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class AbstractLookup:
+    """A look-up at a random place over an abstract map.
+
+    Attributes:
+        element: What stands for any element there.
+        key: What identifies the look-up.
+        table: Its elements.
+        place: The place.
+        going: Which way goes who is there, where that matters.
+    """
+
+    element: AbstractElement
+    key: object
+    table: LookupTable
+    place: Node
+    going: tuple[Node, ...]
+
+
 class Lookups:
     """The look-ups of one run of a program: the same one at the same place is the same choice.
 
@@ -194,6 +234,7 @@ class Lookups:
         ranks: Which of several elements that overlap, by family and place.
         known: Properties of objects, by index and name: their values, or None for those that are random.
         courses: Where a driver who keeps to a lane comes to, by the lane and whether it is driven against its way.
+        abstract: Look-ups over an abstract map, by the identity of the index.
     """
 
     def __init__(self) -> None:
@@ -203,8 +244,8 @@ class Lookups:
         self.ranks: dict[tuple[object, ...], Index] = {}
         self.known: dict[tuple[int, str], Constant | None] = {}
         self.courses: dict[tuple[Lane, bool], PolygonSet] = {}
+        self.abstract: dict[int, AbstractLookup] = {}
         self._kept: list[Node] = []
-        self._meant: dict[int, AbstractElement] = {}
 
     def table(self, key: object, make: Callable[[], LookupTable]) -> LookupTable:
         """The table of a look-up, made once."""
@@ -218,7 +259,9 @@ class Lookups:
         whose = (key, bool(going)), where
         if whose not in self.indices:
             self._kept.append(place)
-            self.indices[whose] = self._make_index(table, place, going, where, span)
+            index = self.indices[whose] = self._make_index(table, place, going, where, span)
+            if isinstance(table.occupancy, AbstractOccupancy):
+                self.abstract[id(index)] = AbstractLookup(AbstractElement(table.occupancy), key, table, place, going)
         return self.indices[whose]
 
     def options(self, table: LookupTable, index: Node) -> tuple[NetworkElement | tuple[Maneuver, ...], ...]:
@@ -228,9 +271,8 @@ class Lookups:
             table: The options.
             index: Which of them lies there.
         """
-        if not isinstance(table.occupancy, AbstractOccupancy):
-            return table.options
-        return (self._meant.setdefault(id(index), AbstractElement(table.occupancy.kind)),)
+        known = self.abstract.get(id(index))
+        return table.options if known is None else (known.element,)
 
     def numbers(
         self, table: LookupTable, place: Node, span: Span, count: int | None = None, going: tuple[Node, ...] = ()

@@ -20,14 +20,19 @@ from scenicq.compiler.values import Choice, Instance, ModelValue, fail
 from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.forest.nodes import GOING, LAST_LANE, Constant, Node, Vector
+from scenicq.geometry.abstract_map import NeedsMapError
 from scenicq.geometry.elements import Intersection, NetworkElement
+from scenicq.geometry.links import link_named
 from scenicq.geometry.network import Network
 from scenicq.geometry.occupancy import ElementAtPoint
 
 if TYPE_CHECKING:
     from scenicq.compiler.interpreter import Interpreter
 
-__all__ = ["among", "going_of", "look_up", "look_up_of", "look_up_ways"]
+__all__ = ["among", "going_of", "linked", "look_up", "look_up_of", "look_up_ways"]
+
+_WITH_NOTHING = 2
+"""Outcomes of a look-up over an abstract map: any element, and none."""
 
 
 def look_up_of(run: Interpreter, owner: Instance, name: str, reject: ModelValue, span: Span) -> ModelValue:
@@ -84,6 +89,38 @@ def look_up(
     table = run.lookups.table((id(network), name), lambda: LookupTable.of_network(network, name))
     known = getattr(network, name, None)
     return _at(run, (id(network), name), table, point, reject, span, known, going=going)
+
+
+def linked(run: Interpreter, choice: Choice, name: str, span: Span) -> ModelValue:
+    """What an attribute of the element at a place leads to, over an abstract map: a look-up at the same place.
+
+    Args:
+        run: The interpreter.
+        choice: The element; an option of it is abstract.
+        name: The attribute.
+        span: Where it is asked for.
+
+    Raises:
+        NeedsMapError: The attribute is no link of all such elements, or may be one of something else.
+    """
+    known = run.lookups.abstract.get(id(choice.index))
+    if known is None or len(choice.options) != _WITH_NOTHING or choice.options[0] is not known.element:
+        raise NeedsMapError
+    found = link_named(known.element.kind, name)
+    if found is None or choice.options[1] is not None:
+        raise NeedsMapError
+    link, needed = found
+    key = (known.key, link)
+    where = known.element.found.through(link)
+    table = run.lookups.table(key, lambda: LookupTable.of_any(where, known.table.family, run.network))
+    if not table.options:
+        raise NeedsMapError
+    # None has no attributes
+    run.excluded.add(choice.index, [1], _WITH_NOTHING, span)
+    index = run.lookups.index(key, table, known.place, known.going, span)
+    if needed:
+        run.excluded.add(index, [1], _WITH_NOTHING, span)
+    return Choice(index, (*run.lookups.options(table, index), None), _WITH_NOTHING)
 
 
 def among(

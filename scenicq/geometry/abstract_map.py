@@ -1,18 +1,21 @@
 """Any map of some traits: what a program says of the element at a place, whichever that is.
 
 `ego.lane` is over an abstract map one element that stands for every lane. What can be said of all lanes alike (where
-"in the lane of the ego" is, as a relation between objects and lanes) is said of it. Whatever asks for more raises
-`NeedsMapError`: no list of what depends on a map could be complete.
+"in the lane of the ego" is, as a relation between objects and lanes) is said of it. What a lane leads to by the links
+of maps (its group, the section to the left of its own) is an element that is looked up at the same place. Whatever
+asks for more raises `NeedsMapError`: no list of what depends on a map could be complete.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.geometry.elements import NetworkElement
+from scenicq.geometry.links import LINKS
 from scenicq.geometry.map_traits import MapTraits
 from scenicq.geometry.network import Network
 from scenicq.geometry.occupancy import Layer, Occupancy
@@ -25,6 +28,7 @@ __all__ = [
     "AbstractElement",
     "AbstractNetwork",
     "AbstractOccupancy",
+    "LinkedFrom",
     "NeedsMapError",
 ]
 
@@ -54,14 +58,19 @@ class AbstractElement(NetworkElement):
     Whether it is that at another place is not known, so that it has no hash.
 
     Attributes:
-        kind: The kind, as of features.
+        found: What the elements are at each place.
     """
 
-    def __init__(self, kind: str) -> None:
-        """Take the kind."""
-        vars(self).update(kind=kind, region=AbstractArea(kind))
+    def __init__(self, found: AbstractOccupancy) -> None:
+        """Take what they are."""
+        vars(self).update(found=found, region=AbstractArea(found))
 
-    kind: str
+    found: AbstractOccupancy
+
+    @property
+    def kind(self) -> str:
+        """The kind of all of them."""
+        return self.found.kind
 
     @property
     def orientation(self) -> NoReturn:  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -100,14 +109,15 @@ class AbstractArea(PolygonSet):
     """The area of any element of a kind.
 
     Attributes:
-        kind: The kind.
+        found: What the elements are at each place.
     """
 
-    def __init__(self, kind: str) -> None:
-        """Take the kind."""
-        vars(self).update(name=f"any {kind}", kind=kind, orientation=AbstractDirection(f"orientation of any {kind}"))
+    def __init__(self, found: AbstractOccupancy) -> None:
+        """Take what they are."""
+        name = f"any {found.kind}"
+        vars(self).update(name=name, found=found, orientation=AbstractDirection(f"orientation of {name}"))
 
-    kind: str
+    found: AbstractOccupancy
 
     @property
     def polygons(self) -> NoReturn:  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -129,23 +139,56 @@ class AbstractArea(PolygonSet):
         raise TypeError(f"{self.name} is of no map")
 
 
+@dataclass(frozen=True, slots=True)
+class LinkedFrom:
+    """What is found at a place, as what its elements lead to.
+
+    Attributes:
+        kind: The kind of the elements in whose areas the place is.
+        links: The links from one of these, one after the other, to what is found.
+    """
+
+    kind: str
+    links: tuple[str, ...] = ()
+
+
 class AbstractOccupancy(Occupancy):
     """Any element of a kind at each point, or none.
 
     Attributes:
         kind: The kind.
+        starts: From what elements at the point it is found: a later one counts only where there are none of the
+            earlier.
     """
 
-    def __init__(self, name: str, kind: str) -> None:
+    def __init__(self, name: str, kind: str, starts: tuple[LinkedFrom, ...]) -> None:
         """Take the kind.
 
         Args:
             name: What messages call the look-up.
-            kind: As of features.
+            kind: As of features; `lane_section` of what lanes consist of, whether or not the map cuts them.
+            starts: From what elements.
         """
-        vars(self).update(name=name, kind=kind, nothing=1)
+        vars(self).update(name=name, kind=kind, starts=starts, nothing=1)
 
     kind: str
+    starts: tuple[LinkedFrom, ...]
+
+    @property
+    def is_found_itself(self) -> bool:
+        """Whether the elements are found in areas that the map calls their own, and nowhere else."""
+        return self.starts == (LinkedFrom(self.kind),) and self.kind != "lane_section"
+
+    def through(self, link: str) -> AbstractOccupancy:
+        """What the elements lead to by one of their links."""
+        starts = tuple(LinkedFrom(each.kind, (*each.links, link)) for each in self.starts)
+        return AbstractOccupancy(f"{self.name}.{link}", LINKS[self.kind][link], starts)
+
+    def leads_to(self, other: AbstractOccupancy) -> bool:
+        """Whether what this finds leads to what another one finds."""
+        pairs = list(zip(self.starts, other.starts, strict=False))
+        same = len(self.starts) == len(other.starts) and all(one.kind == two.kind for one, two in pairs)
+        return same and all(two.links[: len(one.links)] == one.links for one, two in pairs)
 
     @property
     def layers(self) -> tuple[Layer, ...]:  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -159,8 +202,8 @@ class AbstractOccupancy(Occupancy):
 
     @property
     def is_of_lanes(self) -> bool:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """Whether the elements are lanes."""
-        return self.kind == "lane"
+        """Whether they are found where lanes are."""
+        return self.starts[0].kind in ("lane", "lane_section")
 
     def near(self, boxes: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
         """Anything may lie in a box."""

@@ -43,7 +43,7 @@ from scenicq.geometry.maneuvers import by_heading, maneuvers_of
 from scenicq.geometry.own_directions import along_unread_centerline, direction_of_intersection, direction_of_lanes
 from scenicq.geometry.regions import DeferredPolylines, PolylineSet
 
-__all__ = ["Elements", "link"]
+__all__ = ["Elements", "link", "related"]
 
 _Element = TypeVar("_Element", bound=NetworkElement)
 _Long = TypeVar("_Long", bound=LongElement)
@@ -73,8 +73,8 @@ class Elements:
         return {name: element for table in tables for name, element in table.items()}
 
 
-def link(features: Sequence[MapFeature]) -> Elements:
-    """The elements of a network with their references; references that dangle are passed over.
+def related(features: Sequence[MapFeature]) -> Elements:
+    """The elements of a network, with what they are parts of and lie beside, but neither lines nor ways on.
 
     Args:
         features: With unique ids.
@@ -82,14 +82,26 @@ def link(features: Sequence[MapFeature]) -> Elements:
     elements = Elements()
     for number, feature in enumerate(features):
         _make(feature, number, elements)
-    by_kind: dict[str, list[MapFeature]] = {}
-    for feature in features:
-        by_kind.setdefault(feature.kind, []).append(feature)
+    by_kind = _by_kind(features)
     lanes = by_kind.get("lane", [])
     _link_groups(by_kind.get("lane_group", []), lanes, elements)
     _link_roads(by_kind.get("road", []), elements)
-    _make_curbs(by_kind.get("curb", []), elements)
     _link_sections(by_kind.get("lane_section", []), lanes, elements)
+    for kind, owned in (("sidewalk", elements.sidewalks), ("shoulder", elements.shoulders)):
+        for feature in by_kind.get(kind, []):
+            owned[feature.id].road = _first(elements.roads, feature, "road")
+    return elements
+
+
+def link(features: Sequence[MapFeature]) -> Elements:
+    """The elements of a network with their references; references that dangle are passed over.
+
+    Args:
+        features: With unique ids.
+    """
+    elements, by_kind = related(features), _by_kind(features)
+    lanes = by_kind.get("lane", [])
+    _make_curbs(by_kind.get("curb", []), elements)
     _link_road_sections(by_kind.get("road_section", []), elements)
     _link_lanes(lanes, elements)
     _link_intersections(by_kind.get("intersection", []), elements)
@@ -102,6 +114,13 @@ def link(features: Sequence[MapFeature]) -> Elements:
         lane.maneuvers = maneuvers_of(lane)
     _link_maneuvers(by_kind.get("intersection", []), elements)
     return elements
+
+
+def _by_kind(features: Sequence[MapFeature]) -> dict[str, list[MapFeature]]:
+    found: dict[str, list[MapFeature]] = {}
+    for feature in features:
+        found.setdefault(feature.kind, []).append(feature)
+    return found
 
 
 def _make(feature: MapFeature, number: int, elements: Elements) -> None:
@@ -371,13 +390,10 @@ def _link_maneuvers(features: list[MapFeature], elements: Elements) -> None:
 
 
 def _link_ends(feature: MapFeature, element: NetworkElement | None, everything: dict[str, NetworkElement]) -> None:
-    """What the map says lies before and behind an element, and whose it is."""
+    """What the map says lies before and behind an element."""
     for key in ("successor", "predecessor"):
         if key in feature.properties and isinstance(element, LongElement):
             _set(element, f"_{key}", _first(everything, feature, key))
-    if isinstance(element, Sidewalk | Shoulder):
-        road = _first(everything, feature, "road")
-        element.road = road if isinstance(road, Road) else None
 
 
 def _link_lines(elements: Elements) -> None:

@@ -13,7 +13,7 @@ import msgspec
 from msgspec import Meta, Struct, structs
 
 from scenicq.errors import DataError, Diagnostic
-from scenicq.store.schema import SCHEMA_VERSION, SCHEMAS, UPGRADABLE
+from scenicq.store.schema import ADDED_TABLES, SCHEMA_VERSION, SCHEMAS, UPGRADABLE
 
 __all__ = [
     "FOLDERS",
@@ -157,7 +157,8 @@ class Manifest(Struct, frozen=True, kw_only=True, tag_field="format", tag=_FORMA
         Raises:
             ValueError: It does.
         """
-        lacking = [name for name in SCHEMAS if name not in self.tables]
+        later = {name for version, names in ADDED_TABLES.items() if version > self.schema for name in names}
+        lacking = [name for name in SCHEMAS if name not in self.tables and name not in later]
         if lacking:
             raise ValueError(f"table {lacking[0]} is missing")
 
@@ -252,7 +253,9 @@ def read_manifest(name: str, data: bytes, *, older: bool = False) -> Manifest:
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         raise _damaged(path, f"is unsound: {error}") from error
     # other tables than those that are known are nobody's
-    return structs.replace(manifest, tables={each: manifest.tables[each] for each in SCHEMAS})
+    return structs.replace(
+        manifest, tables={each: manifest.tables[each] for each in SCHEMAS if each in manifest.tables}
+    )
 
 
 def _damaged(path: str, what: str) -> DataError:

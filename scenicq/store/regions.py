@@ -1,4 +1,4 @@
-"""Maps as rows: `regions` (everything) and `lanes` (for queries), and back."""
+"""Maps as rows: `regions` (everything), `lanes` and `links` (for queries), and back."""
 
 from __future__ import annotations
 
@@ -17,12 +17,13 @@ from numpy.typing import NDArray
 
 from scenicq.geometry.centerlines import centerlines
 from scenicq.geometry.features import MapFeature, names
+from scenicq.geometry.links import links_of
 from scenicq.geometry.map_traits import MapTraits, traits_of
 from scenicq.store.manifest import MapGroup
 from scenicq.store.place import StoreFile, open_parquet
 from scenicq.store.schema import SCHEMAS, ArrowTable
 
-__all__ = ["MapFiles", "lane_rows", "map_groups", "region_rows"]
+__all__ = ["MapFiles", "lane_rows", "link_rows", "map_groups", "region_rows"]
 
 _encode = json.JSONEncoder(ensure_ascii=False, separators=(",", ":")).encode
 
@@ -56,6 +57,14 @@ def lane_rows(map_name: str, features: Sequence[MapFeature]) -> ArrowTable:
         },
         schema=SCHEMAS["lanes"],
     )
+
+
+def link_rows(map_name: str, features: Sequence[MapFeature]) -> ArrowTable:
+    """How the elements of a map hang together."""
+    found = list(links_of(features))
+    columns = list(zip(*found, strict=True)) or [[], [], [], []]
+    rows = dict(zip(("kind", "region", "link", "target"), columns, strict=True))
+    return pa.table({"map": [map_name] * len(found), **rows}, schema=SCHEMAS["links"])
 
 
 def map_groups(maps: Mapping[str, Sequence[MapFeature]]) -> tuple[MapGroup, ...]:

@@ -16,6 +16,7 @@ import pyarrow as pa
 
 __all__ = [
     "ADDED",
+    "ADDED_TABLES",
     "GEO_METADATA",
     "MEMBERSHIP_RADIUS_M",
     "SCHEMAS",
@@ -40,6 +41,9 @@ UPGRADABLE = frozenset({2, 3, 4, 5, 6, 7})
 
 ADDED = {4: frozenset({"z", "pitch", "roll", "image_width", "image_height", "intrinsics", "camera_pose"})}
 """Columns of the source that came with a version (of egos with `ego_` before); older datasets know nothing there."""
+
+ADDED_TABLES = {8: frozenset({"links"})}
+"""Tables that came with a version; older datasets lack them."""
 
 MEMBERSHIP_RADIUS_M = 2.0
 """`memberships` lists the regions within this distance: a position tolerance up to it can be prefiltered."""
@@ -167,6 +171,16 @@ SCHEMAS: dict[str, pa.Schema] = {
             pa.field("right", _TEXT),
             _required("predecessors", pa.list_(_TEXT)),
             _required("successors", pa.list_(_TEXT)),
+        ]
+    ),
+    # * One row for each way from an element of a map to another: the region that each is in `memberships`.
+    "links": pa.schema(
+        [
+            _required("map", _TEXT),
+            _required("kind", _TEXT),  # of the first: `lane_section` of a lane that the map does not cut, too
+            _required("region", _TEXT),
+            _required("link", _TEXT),  # the attribute that leads to the other
+            _required("target", _TEXT),
         ]
     ),
     # One row a sensor file. Cameras: all four are known, or none.

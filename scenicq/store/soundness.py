@@ -31,12 +31,12 @@ def check_dataset(place: Place, manifest: Manifest) -> None:
     """
     _check_counts(manifest)
     mapped = MapFiles(tuple(map(place.file, manifest.tables["regions"])), manifest.map_groups)
-    for table in ("regions", "lanes"):
+    for table in ("regions", "lanes", "links"):
         for part in manifest.tables[table]:
             rows = read_sound(table, place.file(part), part.path)
             if table == "regions":
                 check_regions(rows, part.path, manifest.maps)
-            else:
+            elif table == "lanes":
                 check_lanes(rows, part.path)
     for name in manifest.maps:
         try:
@@ -76,6 +76,6 @@ def _check_counts(manifest: Manifest) -> None:
     if len(set(counts.values())) != 1:
         told = ", ".join(f"{count} of {table}" for table, count in counts.items())
         invalid("dataset.json", f"parts of one number hold the same recordings, but there are {told}")
-    for table in ("regions", "lanes", "frame_index"):
+    for table in ("regions", "lanes", "links", "frame_index"):
         if len(tables[table]) != 1:
             invalid("dataset.json", f"there are {len(tables[table])} files of {table}, not one")

@@ -12,7 +12,7 @@ from scenicq.store.columns import second_of_track
 from scenicq.store.dataset import Dataset
 from scenicq.store.part_rows import PartRows
 from scenicq.store.rebuild import recordings_of
-from scenicq.store.regions import lane_rows
+from scenicq.store.regions import lane_rows, link_rows
 from scenicq.store.rows import recording_rows
 from scenicq.store.schema import SCHEMAS, SEGMENT_TABLES, ArrowArray, ArrowTable
 from scenicq.store.segment import MapIndexes
@@ -32,9 +32,10 @@ def verify_computed(dataset: Dataset) -> None:
     """
     manifest = dataset.manifest
     maps = {name: dataset.features(name) for name in manifest.maps}
-    for part, file in zip(manifest.tables["lanes"], dataset.files("lanes"), strict=True):
-        again = [SCHEMAS["lanes"].empty_table(), *(lane_rows(name, maps[name]) for name in sorted(maps))]
-        _compare("lanes", read_sound("lanes", file, part.path), pa.concat_tables(again), part.path)
+    for table, rows_of in (("lanes", lane_rows), ("links", link_rows)):
+        for part, file in zip(manifest.tables[table], dataset.files(table), strict=True):
+            again = [SCHEMAS[table].empty_table(), *(rows_of(name, maps[name]) for name in sorted(maps))]
+            _compare(table, read_sound(table, file, part.path), pa.concat_tables(again), part.path)
     indexes = MapIndexes(maps)
     for number in range(len(manifest.tables["labels"])):
         with ExitStack() as files:

@@ -243,12 +243,13 @@ class DatasetWriter:
     def _map_rows(self) -> dict[str, Iterable[ArrowTable]]:
         """The rows of the tables of maps, map by map: each map shares row groups with few others."""
         if not any(self.maps.values()):
-            return {"regions": (), "lanes": ()}
-        from scenicq.store.regions import lane_rows, region_rows  # noqa: PLC0415 - slow to load, and for maps
+            return {"regions": (), "lanes": (), "links": ()}
+        from scenicq.store.regions import lane_rows, link_rows, region_rows  # noqa: PLC0415 - slow to load, and for maps
 
         return {
             "regions": (region_rows(name, self.maps[name]) for name in sorted(self.maps)),
             "lanes": (lane_rows(name, self.maps[name]) for name in sorted(self.maps)),
+            "links": (link_rows(name, self.maps[name]) for name in sorted(self.maps)),
         }
 
     def _close_segment(self) -> None:

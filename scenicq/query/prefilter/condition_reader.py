@@ -429,10 +429,10 @@ class ConditionReader:
                 return None if near is None else ColumnCondition(objects, region=near)
             if meant is not None and meant.shared and look_up.object != self.scenario.ego:
                 return ColumnCondition(objects)
-            if meant is None or look_up.object != self.scenario.ego:
+            if meant is None or (meant.among is not None and look_up.object != self.scenario.ego):
                 return self._unreadable(objects)
             near = relations.surely_holds(look_up, numbers if meant.among is None else meant.among, meant.most)
-            return self._unreadable(objects) if near is None else ColumnCondition((), region=near)
+            return self._unreadable(objects) if near is None else ColumnCondition(objects, region=near)
         places = shared_look_ups(condition)
         if places is None or len(objects) != 1:
             return None
@@ -440,7 +440,9 @@ class ConditionReader:
             near = relations.may_share(places, self._required)
             return None if near is None else ColumnCondition(objects, region=near)
         near = None
-        if meant is not None and meant.shared and meant.among is not None:
+        if meant is not None and meant.among is None:
+            near = relations.surely_share(places, range(places[0].occupancy.nothing), meant.most)
+        elif meant is not None and meant.shared and meant.among is not None:
             near = relations.surely_share(places, meant.among, meant.most)
         return self._unreadable(objects) if near is None else ColumnCondition(objects, region=near)
 

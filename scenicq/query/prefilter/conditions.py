@@ -170,10 +170,15 @@ def _meant_elements(group: Group, ego: int) -> MeantElements | None:
     """
     said = [each.expression for each in group.constraints if isinstance(each, Condition)]
     equations = [places for each in said if (places := shared_look_ups(each)) is not None]
-    nodes = postorder([each.expression for each in group.constraints])
+    asked = [each.expression for each in group.constraints if not isinstance(each, Condition)]
+    nodes = postorder([*asked, *(each for each in said if allowed_elements(each) is None)])
     found = [look_up for node in nodes if isinstance(node, Select) and (look_up := look_up_of(node.index))]
     found += [place for places in equations for place in places]
     allowed = [known for each in said if (known := allowed_elements(each))]
+    # that there is what leads to another is said by what is said of the other
+    some = frozenset({0})
+    there = [*found, *(one for one, numbers in allowed if numbers == some)]
+    allowed = [each for each in allowed if each[1] != some or not any(each[0].leads_to(other) for other in there)]
     found += [look_up for look_up, _ in allowed]
     if not found:
         return None

@@ -16,7 +16,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from scenicq.query.prefilter.decision import new_table
-from scenicq.query.prefilter.plan import LABELS, MEMBERSHIPS, OBJECTS, PASSED, SENSORS, Plan
+from scenicq.query.prefilter.plan import LABELS, LINKS, MEMBERSHIPS, OBJECTS, PASSED, SENSORS, Plan
 from scenicq.store.dataset import Dataset
 from scenicq.store.in_memory import fetch_columns
 from scenicq.store.sql import sql_text
@@ -362,6 +362,9 @@ def _rows_of(
             named = [sql_text(name) for (name,) in frames]
             where = f" WHERE frame IN ({', '.join(named) or 'NULL'})"
         yield view, selected + rows + where
+    maps = sorted({*block.maps, block.map})
+    links = dataset.scan("links")
+    yield LINKS, f"SELECT * FROM {links} WHERE map BETWEEN {sql_text(maps[0])} AND {sql_text(maps[-1])}"
 
 
 def _open(connection: duckdb.DuckDBPyConnection, views: Iterable[tuple[str, str]]) -> None:
@@ -397,12 +400,12 @@ def hold(dataset: Dataset, connection: duckdb.DuckDBPyConnection, chosen: Sequen
     Returns:
         How many frames they have.
     """
-    unions: dict[str, list[str]] = {view: [] for view in _TABLES}
+    unions: dict[str, list[str]] = {view: [] for view in (*_TABLES, LINKS)}
     for block in chosen:
         for view, rows in _rows_of(dataset, connection, block, block.part * _PART):
             unions[view].append(rows)
     for view, selected in unions.items():
-        mine = "" if view == LABELS else f" WHERE frame IN (SELECT frame FROM {LABELS})"
+        mine = "" if view in (LABELS, LINKS) else f" WHERE frame IN (SELECT frame FROM {LABELS})"
         distinct = dict.fromkeys(selected)  # memberships may be of a whole part
         connection.execute(f"CREATE TEMP TABLE {view} AS SELECT * FROM ({' UNION ALL '.join(distinct)}){mine}")
     ((count,),) = connection.execute(f"SELECT count(*) FROM {LABELS}").fetchall()

@@ -33,8 +33,9 @@ from scenicq.forest.nodes import (
     Select,
 )
 from scenicq.forest.walk import children, is_leaf
-from scenicq.geometry.abstract_map import AbstractArea, AbstractOccupancy
+from scenicq.geometry.abstract_map import AbstractArea, AbstractOccupancy, LinkedFrom
 from scenicq.geometry.angles import ALONG
+from scenicq.geometry.links import DIRECTS, IS_SECTION, LINKS
 from scenicq.geometry.occupancy import TOLERANCE, ElementAtPoint, Occupancy
 from scenicq.geometry.regions import PolygonSet, Region
 from scenicq.limits import LIMITS
@@ -47,6 +48,10 @@ __all__ = ["LookUp", "MapRelations", "MeantElements", "allowed_elements", "is_al
 
 _AT = f"distance <= {number(TOLERANCE + SLACK)}"
 """An element that may be found at a place."""
+_OF_LANES = ("lane_group", "road")
+"""The kinds of elements whose direction is that of their lane at a place."""
+_TURNED = "turned"
+"""The table of how far the lanes in which objects are, of groups and roads, lead from their headings."""
 _EVERY_RANK = 1 << 30
 """More elements than lie at any place."""
 
@@ -77,6 +82,14 @@ class LookUp:
     def is_same(self, other: LookUp) -> bool:
         """Whether both always find the same element."""
         return self.is_like(other) and self.choice is other.choice
+
+    def leads_to(self, other: LookUp) -> bool:
+        """Whether what it finds always leads to what another one finds, which is something else, over any map."""
+        one, two = self.occupancy, other.occupancy
+        if not isinstance(one, AbstractOccupancy) or not isinstance(two, AbstractOccupancy):
+            return False
+        alike = (self.object, self.by_heading) == (other.object, other.by_heading) and self.choice is other.choice
+        return alike and one is not two and one.leads_to(two)
 
 
 def look_up_of(node: Node) -> LookUp | None:
@@ -124,7 +137,7 @@ def is_along(heading: Node, region: Node, object: int) -> bool:
         return False
     occupancy = look_up.occupancy
     if isinstance(occupancy, AbstractOccupancy):
-        return occupancy.is_of_lanes
+        return occupancy.kind in ("lane", *_OF_LANES) and _is_of_area(fields.options[0], areas.options[0])
     if not occupancy.is_of_lanes:
         return False
     layer, *others = occupancy.layers
@@ -138,6 +151,15 @@ def is_along(heading: Node, region: Node, object: int) -> bool:
         for _, number, owner in layer
         for area, field in ((areas.options[number], fields.options[number]),)
     )
+
+
+def _is_of_area(field: Node, area: Node) -> bool:
+    """Whether a direction is that of any element whose area another one is."""
+    match field, area:
+        case Constant(value=direction), Constant(value=AbstractArea() as found):
+            return direction is found.orientation
+        case _:
+            return False
 
 
 @functools.lru_cache(maxsize=256)
@@ -190,9 +212,15 @@ def shared_look_ups(node: Node) -> tuple[LookUp, LookUp] | None:
     if not isinstance(node, Compare) or node.op is not CompareOp.EQ:
         return None
     one, other = look_up_of(node.left), look_up_of(node.right)
-    if one is None or other is None or one.occupancy is not other.occupancy or one.object == other.object:
+    if one is None or other is None or one.object == other.object:
         return None
-    return one, other
+    alike = one.occupancy is other.occupancy or _are_of_one_kind(one.occupancy, other.occupancy)
+    return (one, other) if alike else None
+
+
+def _are_of_one_kind(one: Occupancy, other: Occupancy) -> bool:
+    """Whether elements that two look-ups find over any map may be the same."""
+    return isinstance(one, AbstractOccupancy) and isinstance(other, AbstractOccupancy) and one.kind == other.kind
 
 
 @dataclass(frozen=True, slots=True)
@@ -222,36 +250,46 @@ class MapRelations:
     names: RegionNames
     ego: int
     _tables: dict[_Table, str] = field(default_factory=dict["_Table", str])
+    _turned: bool = False
 
     @property
     def is_empty(self) -> bool:
         """Whether no condition asks for a table."""
         return not self._tables
 
-    def queries(self, rows: str) -> Iterator[tuple[str, str]]:
+    def queries(self, rows: str, maps: str, links: str) -> Iterator[tuple[str, str]]:
         """The tables that conditions ask for, each with its query.
 
         Args:
             rows: The table of memberships of the ego and whoever may play a role, with the numbers `f` of their frames.
+            maps: SQL of the numbers `f` of frames with their `map`.
+            links: The table of how the elements of these maps hang together.
         """
+        if self._turned:
+            directed = f"l.map = m.map AND l.region = a.region AND l.link = {sql_text(DIRECTS)}"
+            # a lane that only touches a place may direct it, or not
+            yield (
+                _TURNED,
+                f"SELECT a.f, a.object, l.target AS region, min(a.turn) AS turn FROM {rows} a "
+                f"JOIN ({maps}) m USING (f) JOIN {links} l ON {directed} WHERE a.distance <= {number(SLACK)} "
+                "GROUP BY ALL HAVING bool_and(a.distance = 0)",
+            )
         for table, name in self._tables.items():
             own = "object <> 'ego'" if table.everybody else "object = 'ego'"
-            kind = f" AND kind = {sql_text(table.kind)}" if table.kind else ""
-            at = f"SELECT f, object, region, distance, turn FROM {rows} WHERE {own} AND {_AT}{kind}"
-            if table.most:
-                first = f" WHERE region IN {among_names(table.first, self.names)}" if table.first else ""
-                at = (
-                    f"SELECT *, count(*) OVER (PARTITION BY f, object) AS several FROM ({at}){first} "
-                    f"QUALIFY distance = 0 AND several <= {table.most}"
-                )
-            if table.by_heading:
-                at = f"SELECT * FROM ({at}) WHERE several = 1 OR turn <= {number(ALONG - SLACK)}"
-            meant, joined = "region", ""
-            if not table.kind:
-                pairs = ([pair[side] for pair in table.pairs] for side in (0, 1))
-                relation = self.names.table("source, region", *pairs)
-                meant, joined = "r.region", f" JOIN {relation} r ON r.source = e.region"
-            yield name, f"SELECT DISTINCT e.f, e.object, {meant} AS region FROM ({at}) e{joined}"
+            at = f"SELECT f, object, kind, region, distance, turn FROM {rows} WHERE {own} AND {_AT}"
+            if table.starts:
+                starts = table.starts[:1] if table.most else table.starts
+                found = [_led_to(each, table, at, maps, links) for each in starts]
+                yield name, f"SELECT DISTINCT f, object, region FROM ({' UNION ALL '.join(found)})"
+                continue
+            first = f"region IN {among_names(table.first, self.names)}" if table.first else "true"
+            pairs = ([pair[side] for pair in table.pairs] for side in (0, 1))
+            relation = self.names.table("source, region", *pairs)
+            meant = _meant(f"SELECT * FROM ({at}) WHERE {first}", table) if table.most else at
+            yield (
+                name,
+                f"SELECT DISTINCT e.f, e.object, r.region FROM ({meant}) e JOIN {relation} r ON r.source = e.region",
+            )
 
     def possible_elements(self, look_up: LookUp, required: Sequence[Node]) -> MeantElements:
         """Which elements a look-up may mean where all of some conditions hold."""
@@ -272,7 +310,7 @@ class MapRelations:
         Returns:
             SQL over the columns of `memberships` and `q.f`; None if the region is not made of elements of the map.
         """
-        regions = self._regions(region)
+        regions = self._regions(region, look_up)
         if regions is None:
             return None
         among = range(look_up.occupancy.nothing) if meant.among is None else meant.among
@@ -285,6 +323,12 @@ class MapRelations:
         near = f"(q.f, region) IN (SELECT f, region FROM {table}) AND distance <= {number(reach + SLACK)}"
         if turn is None:
             return f"({near})"
+        if isinstance(look_up.occupancy, AbstractOccupancy) and look_up.occupancy.kind in _OF_LANES:
+            self._turned = True
+            rows = f"SELECT f, object, region FROM {_TURNED} WHERE turn"
+            if meant.most:
+                return f"({near} AND (q.f, q.object, region) IN ({rows} <= {number(turn)}))"
+            return f"({near} AND (q.f, q.object, region) NOT IN ({rows} > {number(turn)}))"
         # it is not known of those beside a lane
         led = f"turn <= {number(turn)}" if meant.most else f"coalesce(turn <= {number(turn)}, true)"
         return f"({near} AND {led})"
@@ -304,7 +348,12 @@ class MapRelations:
         if look_up.occupancy.nothing in among:
             return None
         if isinstance(look_up.occupancy, AbstractOccupancy):
-            return f"(kind = {sql_text(look_up.occupancy.kind)} AND {_AT})" if among else "false"
+            if not among:
+                return "false"
+            if look_up.occupancy.is_found_itself:
+                return f"(kind = {sql_text(look_up.occupancy.kind)} AND {_AT})"
+            table = self._table(look_up, {0: ("",)}, everybody=look_up.object != self.ego)
+            return f"((q.f, q.object) IN (SELECT f, object FROM {table}))"
         sources = self._sources(look_up.occupancy)
         if sources is None:
             return None
@@ -312,11 +361,15 @@ class MapRelations:
         return f"(region IN {among_names(ids, self.names)} AND {_AT})"
 
     def surely_holds(self, look_up: LookUp, among: Collection[int], most: int) -> str | None:
-        """A condition on frames: that one of some elements lies where the ego is, and may be the one that is meant."""
+        """A condition on memberships: that one of some elements lies where an object is, and may be the one meant."""
         if look_up.occupancy.nothing in among:
             return None
-        table = self._table(look_up, dict.fromkeys(among, ("",)), most)
-        return None if table is None else f"(q.f IN (SELECT f FROM {table}))"
+        if look_up.object != self.ego and not isinstance(look_up.occupancy, AbstractOccupancy):
+            return None
+        everybody = look_up.object != self.ego
+        table = self._table(look_up, dict.fromkeys(among, ("",)), most, everybody=everybody)
+        who = "(q.f, q.object) IN (SELECT f, object" if everybody else "q.f IN (SELECT f"
+        return None if table is None else f"({who} FROM {table}))"
 
     def may_share(self, places: tuple[LookUp, LookUp], required: Sequence[Node]) -> str | None:
         """A condition on memberships of an object in whose place the element may lie that may lie where the ego is.
@@ -329,6 +382,8 @@ class MapRelations:
         there = [look_up for look_up, numbers in filter(None, found) if look_up.occupancy.nothing not in numbers]
         if not self._is_of_ego(places) or not any(place.is_like(each) for place in places for each in there):
             return None
+        if isinstance(places[0].occupancy, AbstractOccupancy):
+            return self._both_lead_to_one(places, 0)
         table = self._table(places[0], self._themselves(places[0].occupancy))
         return None if table is None else f"((q.f, region) IN (SELECT f, region FROM {table}) AND {_AT})"
 
@@ -342,6 +397,8 @@ class MapRelations:
         """
         if not self._is_of_ego(places):
             return None
+        if isinstance(places[0].occupancy, AbstractOccupancy):
+            return self._both_lead_to_one(places, most) if 0 in among else None
         own = {place: ids for place, ids in self._themselves(places[0].occupancy).items() if place in among}
         mine = next(each for each in places if each.object == self.ego)
         others = next(each for each in places if each is not mine)
@@ -351,14 +408,19 @@ class MapRelations:
         theirs = f"(q.f, q.object, region) IN (SELECT f, object, region FROM {anybody})"
         return f"({theirs} AND (q.f, region) IN (SELECT f, region FROM {ego}))"
 
+    def _both_lead_to_one(self, places: tuple[LookUp, LookUp], most: int) -> str:
+        """The same over any map: that elements at both places lead to one."""
+        mine, others = sorted(places, key=lambda each: each.object != self.ego)
+        ego, anybody = (self._table(each, {0: ("",)}, most, everybody=each is others) for each in (mine, others))
+        same = f"{anybody} b JOIN {ego} e ON b.f = e.f AND b.region = e.region"
+        return f"((q.f, q.object) IN (SELECT b.f, b.object FROM {same}))"
+
     def _is_of_ego(self, places: tuple[LookUp, LookUp]) -> bool:
         """Whether the ego is at one of two places, which are of two objects."""
         return self.ego in (places[0].object, places[1].object)
 
     def _themselves(self, occupancy: Occupancy) -> dict[int, Sequence[str]]:
         """Each element as the regions in which it is found."""
-        if isinstance(occupancy, AbstractOccupancy):
-            return {0: (occupancy.kind,)}
         found: dict[int, Sequence[str]] = {}
         for layer in self._sources(occupancy) or ():
             for each, place in layer:
@@ -370,14 +432,16 @@ class MapRelations:
         found = look_up_of(index)
         return found if found is not None and found.object == self.ego else None
 
-    def _regions(self, region: Select) -> dict[int, Sequence[str]] | None:
+    def _regions(self, region: Select, look_up: LookUp) -> dict[int, Sequence[str]] | None:
         """The regions of each element that a choice by its number has; None if some has no name."""
         meant: dict[int, Sequence[str]] = {}
         for place, option in enumerate(region.options):
             if not isinstance(option, Constant):
                 return None
             if isinstance(option.value, AbstractArea):
-                meant[place] = (option.value.kind,)
+                if option.value.found is not look_up.occupancy:
+                    return None
+                meant[place] = ("",)
             elif isinstance(option.value, Region):
                 ids = region_ids(option.value, self.names)
                 if ids is None:
@@ -409,8 +473,8 @@ class MapRelations:
         """
         occupancy, by_heading = look_up.occupancy, bool(most) and look_up.by_heading
         if isinstance(occupancy, AbstractOccupancy):
-            # what is meant is the element itself
-            return self._named(_Table((), occupancy.kind if meant else "", (), most, everybody, by_heading))
+            # what is meant is what it finds itself
+            return self._named(_Table((), occupancy.starts if meant else (), (), most, everybody, by_heading))
         layers = self._sources(occupancy)
         if layers is None:
             return None
@@ -420,7 +484,7 @@ class MapRelations:
         if len(pairs) > LIMITS.related_regions:
             return None
         first = tuple(sorted({source for source, _ in layers[0]})) if most else ()
-        return self._named(_Table(tuple(pairs), "", first, most, everybody, by_heading))
+        return self._named(_Table(tuple(pairs), (), first, most, everybody, by_heading))
 
     def _named(self, table: _Table) -> str:
         return self._tables.setdefault(table, f"meant{len(self._tables)}")
@@ -432,7 +496,7 @@ class _Table:
 
     Attributes:
         pairs: The element, and a region that is meant.
-        kind: Instead: the kind of elements of which each means itself.
+        starts: Instead, over any map: the elements at a place that lead to what is meant.
         first: The elements of the first layer, of which that one must be; empty where any of them will do.
         most: How many of these may lie at the place; 0 for any number, of all layers.
         everybody: Whether it is of where all others than the ego are.
@@ -440,8 +504,49 @@ class _Table:
     """
 
     pairs: tuple[tuple[str, str], ...]
-    kind: str
+    starts: tuple[LinkedFrom, ...]
     first: tuple[str, ...]
     most: int
     everybody: bool
     by_heading: bool
+
+
+def _meant(at: str, table: _Table) -> str:
+    """SQL of the elements at a place of which any may be meant, surely.
+
+    Args:
+        at: SQL of the elements of the first layer at each place.
+        table: The relation.
+    """
+    several = (
+        f"SELECT *, count(*) OVER (PARTITION BY f, object) AS several FROM ({at}) "
+        f"QUALIFY distance = 0 AND several <= {table.most}"
+    )
+    if not table.by_heading:
+        return several
+    return f"SELECT * FROM ({several}) WHERE several = 1 OR turn <= {number(ALONG - SLACK)}"
+
+
+def _led_to(start: LinkedFrom, table: _Table, at: str, maps: str, links: str) -> str:
+    """SQL of what elements at places lead to: their frame, object and region.
+
+    Args:
+        start: The elements, and what leads from them.
+        table: The relation.
+        at: SQL of all elements at each place.
+        maps: As of `MapRelations.queries`.
+        links: The same.
+    """
+    at = f"SELECT a.*, m.map FROM ({at}) a JOIN ({maps}) m USING (f)"
+    if start.kind == "lane_section":
+        # a lane that is not cut is one, too
+        known = f"SELECT map, region FROM {links} WHERE link = {sql_text(IS_SECTION)}"
+        at = f"SELECT * FROM ({at}) WHERE (map, region) IN ({known})"
+    else:
+        at = f"SELECT * FROM ({at}) WHERE kind = {sql_text(start.kind)}"
+    joined, region, kind = "", "e.region", start.kind
+    for step, link in enumerate(start.links):
+        own = f"l{step}.kind = {sql_text(kind)} AND l{step}.link = {sql_text(link)}"
+        joined += f" JOIN {links} l{step} ON l{step}.map = e.map AND l{step}.region = {region} AND {own}"
+        region, kind = f"l{step}.target", LINKS[kind][link]
+    return f"SELECT e.f, e.object, {region} AS region FROM ({_meant(at, table) if table.most else at}) e{joined}"

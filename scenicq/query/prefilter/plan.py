@@ -29,10 +29,12 @@ from scenicq.query.prefilter.sql_ends import SqlTruth, columns_of, number
 from scenicq.store.classes import ROOT, class_matches, subclasses
 from scenicq.store.sql import sql_text
 
-__all__ = ["LABELS", "MEMBERSHIPS", "OBJECTS", "PASSED", "SENSORS", "Plan", "make_plan"]
+__all__ = ["LABELS", "LINKS", "MEMBERSHIPS", "OBJECTS", "PASSED", "SENSORS", "Plan", "make_plan"]
 
 LABELS, MEMBERSHIPS = "block_labels", "block_memberships"
 """The views that a plan reads: rows of a block of each table with their `number` in the file."""
+LINKS = "block_links"
+"""The view of how the elements of the maps of a block hang together."""
 SENSORS = "block_sensors"
 """The view of the sensor files of a block."""
 PASSED = "passed"
@@ -350,7 +352,8 @@ def _regions(
         # asked more than once
         statements.append(new_table("placings", rows))
         rows = "SELECT * FROM placings"
-        statements += [new_table(*each) for each in relations.queries("placings")]
+        maps = f"SELECT number AS f, map FROM {LABELS}"
+        statements += [new_table(*each) for each in relations.queries("placings", maps, LINKS)]
     statements.append(
         new_table(
             "flags",

@@ -19,7 +19,7 @@ def test_it_says_what_there_is(run, crossroads):
     assert ["crossroads", "156", "676"] in lines
     assert ["06-cut-in", "26", "104"] in lines
     assert any(line[:3] == ["objects", "676", "1"] for line in lines)
-    assert any(line[:2] == ["all", "7"] for line in lines)
+    assert any(line[:2] == ["all", "8"] for line in lines)
     assert any(line[:2] == ["frame_index", "hash,"] for line in lines)
     assert "ego_road_directions" in result.stdout
     assert max(map(len, result.stdout.splitlines())) <= 120

@@ -15,7 +15,7 @@ import pytest
 SAMPLES = Path(__file__).parents[3] / "sample_data"
 PROGRAM = SAMPLES / "scenarios" / "02_crossing_cars.scenic"
 ALL = ("--all", "--no-prefilter", "--method", "smt", "--exit-zero")
-NAMES = ("labels", "objects", "memberships", "sensors", "regions", "lanes", "frame_index", "segments")
+NAMES = ("labels", "objects", "memberships", "sensors", "regions", "lanes", "links", "frame_index", "segments")
 
 
 def run(*words, **more):

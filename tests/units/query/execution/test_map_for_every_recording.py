@@ -35,8 +35,17 @@ PROGRAMS = {
     "ahead in the lane": "ego = new Car\nother = new Car on ego.lane, facing Range(-9, 9) deg\n"
     "require (distance to other) < 19",
     "in one lane": "ego = new Car\nother = new Car\nrequire other.lane is ego.lane",
+    "of the group": "ego = new Car\nother = new Car on ego.laneGroup",
+    "on the other side": "ego = new Car\nother = new Car on ego.lane.group.opposite",
+    "on the road": "ego = new Car\nother = new Car on ego.road, facing Range(-180, 180) deg",
+    "to the left": "ego = new Car\nother = new Car on ego.laneSection.laneToLeft, facing Range(-180, 180) deg",
+    "in the left lane": "ego = new Car\nother = new Car\nrequire other.lane is ego.laneSection.laneToLeft.lane",
+    "in another group": "ego = new Car\nother = new Car\nrequire other.laneGroup is ego.oppositeLaneGroup",
     "comes near": "ego = new Car\nother = new Car\nrequire eventually (distance to other) < 12",
 }
+
+LINKED = ["of the group", "on the other side", "on the road", "to the left", "in the left lane", "in another group"]
+"""Programs that ask how elements hang together."""
 
 
 def _square(west, south, east, north):
@@ -48,10 +57,17 @@ def _map(number):
     at = 10.0 * number
     features = [{"id": "land", "kind": "drivable", "shape": _square(at - 50, -50, at + 50, 90)}]
     if number != WITHOUT_LANES:
-        for name, west, ends in (("up", at - 2, (-50, 90)), ("down", at - 6, (90, -50))):
+        # the same names mean other things on each map
+        up, down = (f"group{(number + turned) % 2}" for turned in (0, 1))
+        for name, west, ends, own in (("up", at - 2, (-50, 90), up), ("down", at - 6, (90, -50), down)):
             line = [[west + 2, ends[0]], [west + 2, ends[1]]]
-            shape = _square(west, -50, west + 4, 90)
-            features.append({"id": name, "kind": "lane", "shape": shape, "centerline": [line]})
+            shape, other = _square(west, -50, west + 4, 90), {"up": "down", "down": "up"}[name]
+            links = {"group": own, "left": other}
+            features.append({"id": name, "kind": "lane", "shape": shape, "centerline": [line], **links})
+            opposite = down if own == up else up
+            features.append({"id": own, "kind": "lane_group", "shape": shape, "road": "way", "opposite": opposite})
+        ways = {"forward": [up], "backward": [down]}
+        features.append({"id": "way", "kind": "road", "shape": _square(at - 6, -50, at + 2, 90), **ways})
     if number == CROSSING:
         features.append({"id": "zebra", "kind": "crossing", "shape": _square(at - 9, 8, at + 9, 12)})
     listed = [{"type": "Feature", "geometry": each.pop("shape"), "properties": each} for each in features]
@@ -129,13 +145,16 @@ def _expected(alone, program, **options):
 @pytest.mark.parametrize("program", PROGRAMS)
 @pytest.mark.one_in(16)
 def test_a_map_for_every_recording_gives_what_each_map_alone_does(alone, together, program, options):
-    expected = _expected(alone, PROGRAMS[program], **options)
-    assert _asked(together, PROGRAMS[program], **options) == expected
-    assert expected[0]
+    found, excluded, frames, candidates = _expected(alone, PROGRAMS[program], **options)
+    asked = _asked(together, PROGRAMS[program], **options)
+    assert (asked[0], asked[2]) == (found, frames)
+    # links say of any map what is not said of one
+    assert asked[3] <= candidates if program in LINKED else (asked[1], asked[3]) == (excluded, candidates)
+    assert found
 
 
 @pytest.mark.parametrize(
-    "program", ["beside the ego", "along the road", "in the lane", "ahead in the lane", "in one lane"]
+    "program", ["beside the ego", "along the road", "in the lane", "ahead in the lane", "in one lane", *LINKED]
 )
 @pytest.mark.one_in(5)
 def test_frames_that_nobody_reads_proofs_of_are_the_same(alone, together, program):
@@ -177,7 +196,7 @@ def test_maps_are_read_when_a_candidate_needs_one(together, monkeypatch):
     assert len(read) == len(set(read))
 
 
-@pytest.mark.parametrize("program", ["ahead in the lane", "in one lane"])
+@pytest.mark.parametrize("program", ["ahead in the lane", "in one lane", *LINKED])
 def test_elements_at_places_are_told_by_relations(together, monkeypatch, program):
     read: list[str] = []
     features = MapFiles.features

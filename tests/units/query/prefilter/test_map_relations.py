@@ -6,7 +6,7 @@ import itertools
 import math
 import random
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,6 +19,7 @@ from scenicq.forest.evaluate import evaluate
 from scenicq.forest.nodes import GOING, LAST_LANE, Constant, Index, Node, PointIn, Select
 from scenicq.forest.walk import leaves
 from scenicq.geometry.abstract_map import AbstractNetwork
+from scenicq.geometry.features import REFERENCES, MapFeature
 from scenicq.geometry.regions import PolygonSet
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
@@ -58,6 +59,14 @@ NAMES = (
     "other._road",
 )
 FARTHER = ("intersection", "crossing", "road", "ego.lane", "network.lanes[0]")
+LINKED = (
+    "ego.lane", "ego.laneGroup", "ego.road", "ego.laneSection", "ego.oppositeLaneGroup", "ego.lane.group",
+    "ego.lane.road", "ego.laneSection.laneToLeft", "ego.laneSection.laneToRight", "ego.laneSection.fasterLane",
+    "ego.laneSection._slowerLane", "ego.laneSection.lane", "ego.lane.group.opposite", "ego.laneGroup.road",
+    "ego.laneSection.laneToLeft.laneToLeft", "ego.laneSection.laneToRight.lane", "ego.laneSection.laneToLeft.group",
+    "ego.road.intersection", "ego._lane.group", "(ego.laneSection._laneToLeft or ego.lane)",
+)  # fmt: skip
+"""Elements that links lead to from where the ego is."""
 TURNS = ("LEFT_TURN", "RIGHT_TURN", "STRAIGHT")
 
 
@@ -89,6 +98,57 @@ def question(draw: random.Random) -> str:
             ])
         )  # fmt: skip
     return HEAD + "\n".join(lines) + "\n"
+
+
+def linked_question(draw: random.Random) -> str:
+    """A program that asks how elements of the map hang together."""
+    place = draw.choice(LINKED)
+    facing = draw.choice(["", ", facing Range(-180, 180) deg", ", facing Range(-30, 30) deg relative to ego.heading"])
+    placed = draw.choice([f"new Car {draw.choice(['on', 'in'])} {place}{facing}"] * 3 + [f"new Car {ANY}"])
+    lines = [f"other = {placed}"]
+    for _ in range(draw.choice([0, 1, 1, 2])):
+        side, one = draw.choice(["Left", "Right"]), draw.choice(LINKED)
+        lines.append(
+            "require "
+            + draw.choice([
+                "other.lane is ego.lane", "other.laneGroup is ego.laneGroup", "other.road is ego.lane.road",
+                "other._laneGroup is ego.lane.group.opposite", "other.lane.group is ego.laneGroup",
+                f"other.laneSection is ego.laneSection._laneTo{side}",
+                f"other._lane is ego.laneSection.laneTo{side}.lane",
+                f"ego.laneSection.laneTo{side} is other.laneSection", "not (other._laneGroup is ego._laneGroup)",
+                f"ego.laneSection._laneTo{side} is None", f"ego.laneSection._laneTo{side} is not None",
+                f"other.laneSection._laneTo{side} is not None", "other.lane.group.opposite is not None",
+                "ego.laneSection.laneToLeft is not ego.laneSection.laneToRight", "ego.laneGroup is ego.lane.group",
+                "ego.road.intersection is None", f"other in {one}", f"not (other.position in {one})",
+                "5 < (distance to other) < 20",
+            ])
+        )  # fmt: skip
+    return HEAD + "\n".join(lines) + "\n"
+
+
+def called_otherwise(features: Sequence[MapFeature], number: int) -> list[MapFeature]:
+    """The same map with the names of elements of each kind exchanged."""
+    kinds: dict[str, list[str]] = {}
+    for each in features:
+        kinds.setdefault(each.kind, []).append(each.id)
+    names = {
+        name: listed[(place + number) % len(listed)] for listed in kinds.values() for place, name in enumerate(listed)
+    }
+
+    def renamed(value: object) -> object:
+        return [names.get(each, each) for each in value] if isinstance(value, list) else names.get(value, value)
+
+    return [
+        replace(
+            each,
+            id=names[each.id],
+            properties={
+                key: renamed(value) if key in REFERENCES.get(each.kind, {}) and value is not None else value
+                for key, value in each.properties.items()
+            },
+        )
+        for each in features
+    ]
 
 
 def labels(draw: random.Random, count: int) -> list[Label]:
@@ -143,15 +203,29 @@ def mapped(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
     return open_dataset(folder)
 
 
+@pytest.fixture(scope="module")
+def named(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
+    """Three maps with the same elements, each of which goes by the name of another."""
+    folder = tmp_path_factory.mktemp("named") / "d"
+    made = labels(random.Random(5), 150)
+    maps = {f"map{number}": called_otherwise(STREET.features, number) for number in range(3)}
+    recordings = [
+        Recording(f"r{name}", name, tuple(replace(each, recording=f"r{name}", map=name) for each in made[number::3]))
+        for number, name in enumerate(maps)
+    ]
+    write_dataset(folder, iter(recordings), maps, name="d")
+    return open_dataset(folder)
+
+
 def verdicts(dataset: Dataset, text: str, options: MatchOptions, **how: bool) -> dict[str, str]:
     query = Query(dataset, Source("p.scenic", text), QueryOptions(options, **how))
     return {each.frame: type(each.verdict).__name__ for each in query.results()}
 
 
-def check(dataset: Dataset, seed: int) -> int:
+def check(dataset: Dataset, seed: int, asked_of: Callable[[random.Random], str] = question) -> int:
     """How many frames match; each way of asking says the same."""
     draw = random.Random(seed)
-    text, options = question(draw), MatchOptions(tolerance=draw.choice(TOLERANCES), timeout_s=5.0)
+    text, options = asked_of(draw), MatchOptions(tolerance=draw.choice(TOLERANCES), timeout_s=5.0)
     try:
         scenario = prepare_scenario(compile_scenario(Source("p.scenic", text), STREET))
     except ScenarioError:
@@ -279,6 +353,15 @@ def test_sql_over_any_map_says_what_the_matcher_says(
     assert sum(check(mapped, seed) for seed in itertools.islice(seeds, rounds(24))) > 0
 
 
+def test_sql_over_any_map_follows_the_links_of_each(
+    named: Dataset, rounds: Callable[[int], int], monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(run, "MAPS_KEPT", 1)
+    seeds = (seed for seed in itertools.count() if abstract(named, linked_question(random.Random(seed))))
+    found = [check(named, seed, linked_question) for seed in itertools.islice(seeds, rounds(60))]
+    assert sum(found) > 0
+
+
 @pytest.mark.parametrize(
     ("said", "known"),
     [
@@ -289,7 +372,17 @@ def test_sql_over_any_map_says_what_the_matcher_says(
         ("other = new Car on ego.lane.maneuvers[0].endLane", False),
         ("other = new Car\nrequire (distance from other to ego.lane) < 3", False),
         ("other = new Car on network.lanes[0]", False),
-        ("other = new Car on ego.laneGroup", False),
+        ("other = new Car on ego.laneGroup", True),
+        ("other = new Car on ego.laneSection.laneToLeft", True),
+        ("other = new Car on ego.oppositeLaneGroup", True),
+        ("other = new Car on ego.lane.group.opposite", True),
+        ("other = new Car\nrequire other.road is ego.lane.road", True),
+        ("other = new Car\nrequire other.lane is ego.laneSection.laneToLeft.lane", True),
+        ("other = new Car\nrequire ego.laneSection._laneToLeft is None", True),
+        ("other = new Car on ego.laneGroup.lanes[0]", False),
+        ("other = new Car on ego.lane.successor", False),
+        ("other = new Car on ego.laneGroup.sidewalk", False),
+        ("other = new Car on (ego.laneSection._laneToLeft or ego.lane)", True),
         ("other = new Car\nrequire ego.lane.uid == 'lane1'", False),
         ("other = new Car\nrequire ego.lane.orientation[ego.position] == other.lane.orientation[ego.position]", False),
     ],
