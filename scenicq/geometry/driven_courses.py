@@ -327,9 +327,9 @@ class _Segments:
         reach = np.minimum.reduceat(away, np.searchsorted(row, np.arange(len(xy)))) + PASS_M
         reached = np.hypot(*to) <= reach[row]
         active = away <= reach[row]
-        self._keys, self.row, self.segment, self.raw, self.part, self.away, self.reached = (
-            each[active] for each in (keys, row, segment, raw, part, away, reached)
-        )
+        self._keys, self.row, self.segment = (each[active] for each in (keys, row, segment))
+        self.raw, self.part, self.away = (each[active] for each in (raw, part, away))
+        self.reached = reached[active]
         # a pass goes on from segment to segment where the corner between them is within reach, too
         self._goes_on = np.zeros(len(self.row), np.bool_)
         follows = (self._keys[1:] == self._keys[:-1] + 1) & line.linked[self.segment[1:]]

@@ -1,9 +1,5 @@
 """What a query has found: results to go through, as a table, in words, as pictures and as a report."""
 
-# pyarrow and pandas have no type stubs here.
-# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
-# pyright: reportUnknownParameterType=false, reportUnknownArgumentType=false
-
 from __future__ import annotations
 
 import json
@@ -198,7 +194,7 @@ class Matches(Sequence[FrameResult]):
         return made
 
     def without_results(self) -> Matches:
-        """The same query, whose results are still to be found."""
+        """The query with none of its results found yet."""
         return Matches.restored(self.query, self.origin, None)
 
     def __reduce__(self) -> tuple[Callable[..., Matches], tuple[Query, str, list[Result] | None]]:
@@ -241,7 +237,8 @@ class Matches(Sequence[FrameResult]):
 
     def __getitem__(self, which: Any) -> Any:
         """A result by its number, several by a slice."""
-        return self._all()[which]
+        found: Any = self._all()[which]
+        return found
 
     def select(self, *, where: str | None = None, sort: str | None = None) -> Matches:
         """Some of the matches, or all in another order, by what the program records; nothing is matched again.
@@ -300,13 +297,13 @@ class Matches(Sequence[FrameResult]):
         return flat_table(self.to_arrow()).to_pandas()
 
     def shot_of(self, result: Result) -> tuple[Shot, Backdrop]:
-        """What a picture of a result shows: of an interval its first frame, with whoever plays the roles there."""
+        """What a picture of a result shows; an interval shows its first frame, with the objects in the roles there."""
         if result.interval is None:
             return self._shot(result.frame)
         return self._shot_in(self.query.dataset.label(result.frame), result)
 
     def _shot_in(self, label: Label, interval: Result) -> tuple[Shot, Backdrop]:
-        """A frame of an interval, with whoever plays the roles there."""
+        """A frame of an interval, with the objects in the roles there."""
         scenario = self.query.compiled_map(label.map).scenario
         return Shot(label, scenario, verdict_at(label, interval)), self._backdrop(label)
 

@@ -19,7 +19,7 @@ from scenicq.store.arrays import lists_at, number_array, repeated_texts
 from scenicq.store.camera_rows import camera_columns
 from scenicq.store.columns import OUT_OF_PLANE, MemberColumns, Memberships, RecordingColumns
 from scenicq.store.ego_courses import course_columns
-from scenicq.store.last_lanes import tracks_of_both
+from scenicq.store.last_lanes import ego_and_object_tracks
 from scenicq.store.motion import motion_of
 from scenicq.store.schema import SCHEMAS, ArrowArray, ArrowTable
 
@@ -57,7 +57,7 @@ def recording_rows(
     if index is not None:
         by_place = np.argsort(np.concatenate((ego_at, object_at)))
         when, headings = np.concatenate((times, times[label_of])), np.concatenate((egos.heading, objects.heading))
-        headings, tracks = headings[by_place], tracks_of_both(one_track, objects.track)
+        headings, tracks = headings[by_place], ego_and_object_tracks(one_track, objects.track)
         last_lane = index.last_lanes(when[by_place], tracks[by_place], xy, headings, placed.near)
         turns = index.turns(xy, placed.place, headings, placed.near)
     return {

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scenicq.budget import Exhausted, Trials, trials_left
 from scenicq.errors import CannotEvaluate
 from scenicq.forest.nodes import Identity, Index, Leaf, PointIn, Value
-from scenicq.limits import LIMITS, exhausted
+from scenicq.limits import LIMITS, limit_exceeded
 from scenicq.match.fields.constraint_network import ConstraintNetwork
 from scenicq.match.fields.contractor import BoxSet
 from scenicq.match.fields.damped_steps import damped_steps
@@ -181,7 +181,7 @@ class _Search:
             Exhausted: This search has had its share.
         """
         if self.tried >= self.most:
-            raise exhausted("witness_trials")
+            raise limit_exceeded("witness_trials")
         self.tried += 1
         return self.space.run(draws)
 

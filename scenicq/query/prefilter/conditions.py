@@ -17,7 +17,7 @@ from scenicq.forest.unobserved import is_only_observed
 from scenicq.forest.walk import conjuncts, postorder
 from scenicq.geometry.network import Network
 from scenicq.match.options import MatchOptions
-from scenicq.match.problem.constraints import build_groups, compared, relevant_properties
+from scenicq.match.problem.constraints import build_groups, compared_properties, relevant_properties
 from scenicq.query.prefilter.condition_reader import (
     EGO,
     ColumnCondition,
@@ -58,7 +58,7 @@ def necessary_conditions(
         return  # noise of any size hides where things are
     reader = ConditionReader(scenario, options.tolerance.for_scenario(scenario), relations, network.roadDirection)
     for owner in scenario.objects:
-        for name in compared(owner, frozenset(owner.properties)):
+        for name in compared_properties(owner, frozenset(owner.properties)):
             given = owner.properties[name]
             heading = owner.properties["heading"].value if "heading" in owner.properties else None
             found = reader.comparison(Comparison(owner.index, name, given.value, given.span), heading=heading)

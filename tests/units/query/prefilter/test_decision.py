@@ -19,7 +19,7 @@ from scenicq.forest.scenario import BuiltIn
 from scenicq.geometry.membership import contains
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
-from scenicq.match.problem.preprocess import ready
+from scenicq.match.problem.preprocess import prepare_scenario
 from scenicq.match.tolerance import EXACT, Tolerance
 from scenicq.match.verdict import Match, NoMatch
 from scenicq.query.execution.run import Query, QueryOptions
@@ -85,7 +85,7 @@ def dataset(tmp_path_factory) -> Dataset:
 
 
 def plan_of(text: str, options: MatchOptions) -> tuple[Plan, Matcher]:
-    scenario = ready(compile_scenario(Source("test.scenic", HEADER + text), STREET))
+    scenario = prepare_scenario(compile_scenario(Source("test.scenic", HEADER + text), STREET))
     options = replace(options, timeout_s=20.0)
     return make_plan(scenario, STREET, options, deciding=True), Matcher(scenario, options)
 
