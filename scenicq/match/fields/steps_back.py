@@ -129,7 +129,7 @@ class _Together:
         """Have some draws be such ones."""
         if self.left is None or not self.left.places.shape[1]:
             self.left = self._closest()
-        count = self.left.places.shape[1]
+        count: int = self.left.places.shape[1]
         some = some[:count]
         chosen = self.left.take(np.arange(len(some)))
         self.left = self.left.take(np.arange(len(some), count))
