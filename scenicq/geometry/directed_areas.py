@@ -112,7 +112,7 @@ class DirectedAreas:
     def _neighbours(self) -> NDArray[np.intp]:
         """The segment before each in its area, and the one behind it; itself where there is none, (2, n)."""
         starts = self.segments[2]
-        own = np.arange(starts[-1])
+        own = np.arange(int(starts[-1]), dtype=np.intp)
         area = np.repeat(np.arange(len(self)), np.diff(starts))
         return np.stack([np.maximum(own - 1, starts[area]), np.minimum(own + 1, starts[area + 1] - 1)])
 

@@ -43,7 +43,7 @@ __all__ = ["DrawsBack", "StepsBack", "steps_back"]
 _WAYS = 4
 """Ways back that are followed for each draw."""
 _FOLLOWED = 64
-"""Draws that two ways are looked for in at once."""
+"""Draws in which two ways are followed at once, to see where they meet."""
 
 _Indices = NDArray[np.intp]
 _Numbers = NDArray[np.float64]
@@ -67,26 +67,11 @@ class DrawsBack:
             anywhere: Makes so many draws that lie anywhere.
             rng: Random numbers.
         """
-        self._led: dict[int, int] = {}
-        self._ways = ways
         pairs = [(one, other) for one, other in combinations(ways, 2) if one.leaf is other.leaf]
         self._parts = [
-            *(_Alone(way, space, rng, self._followed) for way in ways),
-            *(_Together(one, other, space, anywhere, self._followed) for one, other in pairs),
+            *(_Alone(way, space, rng) for way in ways),
+            *(_Together(one, other, space, anywhere, rng) for one, other in pairs),
         ]
-        self._space = space
-        self._rng = rng
-
-    @property
-    def lead_nowhere(self) -> bool:
-        """Whether there is a place to which none of the draws so far leads: more of them would hardly do."""
-        return any(way.is_whole and not self._led.get(id(way), 1) for way in self._ways)
-
-    def _followed(self, way: StepsBack, draws: TrialDraws) -> _Followed:
-        """The ways back of draws, in which everything else is as it is drawn."""
-        found = way.followed(self._space, draws, self._rng, _WAYS * draws.places.shape[1])
-        self._led[id(way)] = self._led.get(id(way), 0) + len(found.draw)
-        return found
 
     def put_into(self, draws: TrialDraws) -> None:
         """Have points of most draws be such ones.
@@ -106,11 +91,10 @@ class _Alone:
     way: StepsBack
     space: TrialSpace
     rng: np.random.Generator
-    follow: Callable[[StepsBack, TrialDraws], _Followed]
 
     def put_into(self, draws: TrialDraws, some: _Indices) -> None:
         """Have points of some draws be such ones; of which there are any."""
-        found = self.follow(self.way, draws.take(some))
+        found = self.way.followed(self.space, draws.take(some), self.rng, _WAYS * len(some))
         # one of the ways of each draw, the others do not matter
         order = self.rng.permutation(len(found.draw))
         mine, first = np.unique(found.draw[order], return_index=True)
@@ -131,13 +115,13 @@ class _Together:
         other: StepsBack,
         space: TrialSpace,
         anywhere: Callable[[int], TrialDraws],
-        follow: Callable[[StepsBack, TrialDraws], _Followed],
+        rng: np.random.Generator,
     ) -> None:
         self.one = one
         self.other = other
         self.space = space
         self.anywhere = anywhere
-        self.follow = follow
+        self.rng = rng
         self.own, self.uses = other.apart_from(one, space)
         self.left: TrialDraws | None = None
 
@@ -145,7 +129,7 @@ class _Together:
         """Have some draws be such ones."""
         if self.left is None or not self.left.places.shape[1]:
             self.left = self._closest()
-        count = self.left.places.shape[1]
+        count: int = self.left.places.shape[1]
         some = some[:count]
         chosen = self.left.take(np.arange(len(some)))
         self.left = self.left.take(np.arange(len(some), count))
@@ -154,7 +138,8 @@ class _Together:
     def _closest(self) -> TrialDraws:
         """Draws that two ways make, those first that come out closest."""
         many = self.anywhere(_FOLLOWED)
-        first, second = self.follow(self.one, many), self.follow(self.other, many)
+        ways = (self.one, self.other)
+        first, second = (way.followed(self.space, many, self.rng, _WAYS * _FOLLOWED) for way in ways)
         away = np.hypot(*(first.place[:, None] - second.place[None]).transpose(2, 0, 1))
         if not away.size:
             return many.take(np.arange(0))
@@ -180,7 +165,6 @@ class StepsBack:
         seen: Where that is.
         beyond: The ids of the nodes that hang on the point.
         before: The steps in which the others are interpreted.
-        is_whole: Whether the place hangs on the point whatever choices come out as.
     """
 
     leaf: PointIn
@@ -188,7 +172,6 @@ class StepsBack:
     seen: tuple[float, float]
     beyond: frozenset[int]
     before: Steps
-    is_whole: bool
 
     def apart_from(self, other: StepsBack, space: TrialSpace) -> tuple[_Indices, _Indices]:
         """The coordinates, and the uses of fields, on which this way hangs and another does not."""
@@ -294,11 +277,7 @@ def steps_back(items: Sequence[Item], steps: Steps) -> list[StepsBack]:
                 beyond = _hanging_on(leaf, steps)
                 if _leads_back(node, leaf, beyond):
                     before = tuple([step for step in steps if id(step[0]) not in beyond])
-                    options = [
-                        each for below in postorder([node]) if isinstance(below, Select) for each in below.options
-                    ]
-                    is_whole = all(id(each) in beyond for each in options)
-                    found.append(StepsBack(leaf, node, seen, beyond, before, is_whole))
+                    found.append(StepsBack(leaf, node, seen, beyond, before))
     return found
 
 

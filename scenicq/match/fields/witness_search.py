@@ -107,8 +107,6 @@ def find_witness(
         if found is not None:
             return found
         trials.left -= search.tried
-        if search.back.lead_nowhere:
-            break
     return None
 
 
@@ -171,7 +169,7 @@ class _Search:
             least = float(elite.residuals.missing.min())
             idle = idle + 1 if least > _PROGRESS * before else 0
             before = min(before, least)
-            if self.replayed >= LIMITS.witness_replays or idle == self.effort.idle or self.back.lead_nowhere:
+            if self.replayed >= LIMITS.witness_replays or idle == self.effort.idle:
                 break
             draws = self._near(elite.draws, _CLOSER**number)
         return None

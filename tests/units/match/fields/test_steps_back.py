@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import random
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,7 +12,7 @@ from scenes import compiled, drawn, label_of
 from scenicq.forest.column_domain import ColumnDomain
 from scenicq.match.fields import field_solver, witness_search
 from scenicq.match.fields.trials import TrialSpace
-from scenicq.match.fields.witness_search import QUICK, Effort, find_witness
+from scenicq.match.fields.witness_search import QUICK, find_witness
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import parse_tolerance
@@ -96,38 +95,6 @@ def test_pairs_of_ways_begin_close_to_each_other_and_are_taken_in_turn(monkeypat
     assert led >= 10, "the first way leads where it should"
     assert off < 1.0, "the other one nearly"
     assert off <= later, "the closest are taken first"
-
-
-def test_a_search_ends_where_no_way_leads_back(monkeypatch):
-    (space,) = spaces(FOLLOWERS, monkeypatch, 1)
-    rounds = []
-
-    def tried(search, draws):
-        rounds.append(draws)
-        return space.run(draws)
-
-    monkeypatch.setattr(witness_search._Search, "_try", tried)
-    monkeypatch.setattr(witness_search._Search, "_witness", lambda *_: None)
-    monkeypatch.setattr(witness_search, "_PROGRESS", 2.0)
-    effort = Effort(draws=12, best=2, rounds=3, descents=1, idle=9)
-    for nowhere in (False, True):
-        rounds.clear()
-        search = witness_search._Search(space, effort, (), witness_search.trials_left(), 0)
-        monkeypatch.setattr(type(search.back), "lead_nowhere", nowhere)
-        assert search.run() is None
-        assert len(rounds) == (1 if nowhere else 3) * (2 + effort.descents)
-
-
-def test_a_place_off_everything_is_led_to_from_nowhere(monkeypatch):
-    (space,) = spaces(FOLLOWERS, monkeypatch, 1)
-    search = witness_search._Search(space, QUICK, (), witness_search.trials_left(), 0)
-    search._anywhere(60)
-    assert not search.back.lead_nowhere
-    space.ways_back[:] = [replace(way, seen=(way.seen[0] + 5e3, way.seen[1])) for way in space.ways_back]
-    search = witness_search._Search(space, QUICK, (), witness_search.trials_left(), 0)
-    assert not search.back.lead_nowhere, "nothing was drawn yet"
-    search._anywhere(60)
-    assert search.back.lead_nowhere == all(way.is_whole for way in space.ways_back)
 
 
 @pytest.mark.slow
