@@ -9,7 +9,7 @@ import click
 
 from scenicq.query.execution.run import Query
 
-from .report import columns, count, plain
+from .report import columns, count, printable
 
 if TYPE_CHECKING:  # takes long to load
     from scenicq.query.explain.advice import Outlook
@@ -56,7 +56,7 @@ def advise(query: Query, *, asked: bool, near: bool = False) -> None:
         lines[0] += f"; {found.without_map:,} lie on maps that lack what the program needs"
     if found.first:
         what, frames = found.first[0]
-        lines[0] += f"; {frames:,} fail first at `{plain(what)}`"
+        lines[0] += f"; {frames:,} fail first at `{printable(what)}`"
     none = "no single change leaves a frame" if found.complete else "no change that was tried leaves a frame"
     if found.outlooks:
         two = bool(found.outlooks[0].change.both)

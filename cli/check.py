@@ -22,12 +22,12 @@ from scenicq.lint.impossible import impossible_requirements
 from scenicq.lint.program import LINTED_MAPS, lint
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.constraints import build_groups, describe_constraint
-from scenicq.match.problem.preprocess import ready
+from scenicq.match.problem.preprocess import prepare_scenario
 from scenicq.option_values import read_values
-from scenicq.query.execution.compiled_map import about_dataset, is_about_map, program_network, read_network
 from scenicq.query.execution.never_compared import coverage
 from scenicq.query.execution.option_texts import QUERY_OPTIONS
 from scenicq.query.execution.program_files import SiblingFiles
+from scenicq.query.execution.program_map import about_dataset, is_about_map, program_network, read_network
 from scenicq.store.atomic_files import write_whole
 from scenicq.store.dataset import Dataset
 from scenicq.store.said_values import said_types
@@ -60,7 +60,9 @@ def networks_of(
     if dataset is not None and map_file is not None:
         hint = "give one of them"
         raise DataError(
-            Diagnostic("option-invalid", "a dataset brings its own maps: `--map` is too much", hints=(hint,))
+            Diagnostic(
+                "option-invalid", "`--map` is for checks without a dataset, which has maps of its own", hints=(hint,)
+            )
         )
     if dataset is not None:
         opened = open_checked(dataset)
@@ -75,7 +77,7 @@ def networks_of(
         except DataError as error:
             if warnings is None:
                 raise
-            more = ("until then, the built-in street stands in",)
+            more = ("until then, the built-in street is used instead",)
             warnings += [replace(each, hints=(*each.hints, *more), severity="warning") for each in error.diagnostics]
             named = None
         yield named or street()
@@ -103,7 +105,7 @@ Details = list[Callable[[Scenario], list[str]]]
 
 def _groups(scenario: Scenario) -> list[str]:
     """The groups of jointly dependent constraints in dependency order, all positions and headings observed."""
-    scenario, seen = ready(scenario), frozenset({"position", "heading"})
+    scenario, seen = prepare_scenario(scenario), frozenset({"position", "heading"})
     signature = (*(seen for _ in scenario.objects), frozenset[str](scenario.params))
     groups = build_groups(scenario, signature, MatchOptions())
     return [
@@ -131,8 +133,8 @@ class _Drawing:
             DataError: option-invalid.
         """
         if self.file.suffix.lower() != ".svg":
-            message = f"modes are drawn as SVG: {self.file} is no name for that"
-            raise DataError(Diagnostic("option-invalid", message, hints=("name a file as modes.svg",)))
+            message = f"modes are drawn as SVG, and the name {self.file} does not end in .svg"
+            raise DataError(Diagnostic("option-invalid", message, hints=("give a name such as modes.svg",)))
 
     def __call__(self, scenario: Scenario) -> list[str]:
         """Draw, and say nothing.
@@ -219,7 +221,7 @@ def _found(
         rest += [replace(each, severity="warning") for each in lacking]
         remarks = lint(source, compiled[:LINTED_MAPS], asked.options, properties=asked.dataset is None)
         if asked.dataset is not None:
-            scenarios = [ready(scenario) for scenario, _ in compiled]
+            scenarios = [prepare_scenario(scenario) for scenario, _ in compiled]
             remarks = [*coverage(asked.dataset, scenarios, asked.options).warnings, *remarks]
         never = {each.span for each in errors}
         remarks = [each for each in remarks if each.span not in never]

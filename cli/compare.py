@@ -11,7 +11,7 @@ from scenicq.store.remote_path import AnyPath
 from .manual import Manual
 from .output import destination, writing
 from .path_type import ANY_PATH
-from .report import plain, show
+from .report import printable, show
 from .streams import say
 
 __all__ = ["report"]
@@ -42,7 +42,7 @@ def report(before: AnyPath, after: AnyPath, *, every: bool, output: AnyPath | No
     doubts = [*([] if doubt is None else [doubt]), *check_complete(found, old, new)]
     show(doubts)
     if output is None or str(output) == "-":
-        say(plain(changes_text(found, every=every)))
+        say(printable(changes_text(found, every=every)))
         return
     with destination(output) as sink, writing(output):
         sink.write(changes_page(found, (str(before), str(after)), doubts).encode())

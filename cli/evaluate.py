@@ -9,7 +9,7 @@ from typing import BinaryIO, Unpack
 
 import click
 
-from scenicq.errors import DataError, Diagnostic, plain_json
+from scenicq.errors import DataError, Diagnostic, printable_json
 from scenicq.evaluate.evaluation import Evaluation, ModelsEvaluation, Results, name_models
 from scenicq.evaluate.evaluation import evaluate_models as judge
 from scenicq.evaluate.evaluation_options import EVALUATION_OPTIONS, EvaluationTexts
@@ -39,7 +39,7 @@ from .options import add_options, by_topic
 from .output import choose_format, destination, writing
 from .path_type import ANY_PATH, LOCAL_PATH, chosen_file
 from .programs import read_scenario
-from .report import columns, plain, show
+from .report import columns, printable, show
 from .sources import SENSORS, sensor_root
 
 __all__ = ["evaluate"]
@@ -53,10 +53,10 @@ _EXTENSIONS = {".json": "json"}
     cls=Manual,
     arguments={
         "RESULTS...": "Programs (.scenic), which are matched, or files that `match -o` wrote, one a scenario: .jsonl, "
-        ".csv or .parquet. Frames of which they do not say whether they match (--limit, --sample, --deadline) are left "
-        "out. With `match --all-matches` all who can play a role are known; else nobody else of a frame that matches "
-        "is compared.",
-        "DATASET": "The dataset that they are of.",
+        ".csv or .parquet. Frames that the results leave undecided (--limit, --sample, --deadline) are left out. "
+        "Results of `match --all-matches` name every object that can play a role; with other results, the further "
+        "objects of a frame that matches are not compared.",
+        "DATASET": "The dataset of the results.",
     },
     topics=by_topic(EVALUATION_OPTIONS, {
         "What counts": {"predictions"},
@@ -134,7 +134,7 @@ def _write(found: ModelsEvaluation, form: str, sink: BinaryIO) -> None:
         case "json":
             record = models_record(found) if found.only is None else evaluation_record(found.only)
             content = json.dumps(record, ensure_ascii=False, indent=1, allow_nan=False)
-            text = plain_json(content) + "\n"
+            text = printable_json(content) + "\n"
         case "csv" | "spreadsheet":
             lines = io.StringIO(newline="")
             rows = CsvRows(lines, COLUMNS, spreadsheet=form == "spreadsheet")
@@ -161,9 +161,9 @@ def _text(found: ModelsEvaluation) -> str:
     if found.only is not None:
         return "\n".join(_model(found.only))
     lines = [*_titled(models_table(found)), ""]
-    lines += [plain(each.sentence) for each in found.pairs]
+    lines += [printable(each.sentence) for each in found.pairs]
     for name, each in found.models.items():
-        lines += ["", plain(name), "", *_model(each)]
+        lines += ["", printable(name), "", *_model(each)]
     return "\n".join(lines)
 
 
@@ -181,10 +181,10 @@ def _model(found: Evaluation) -> list[str]:
         for table in tables(each, found.within):
             lines += ["", *_titled(table)]
         lines.append("")
-        lines += [plain(one.sentence) for one in (*each.headline, *each.weighted)]
-        lines += [plain(one.beside) for one in each.headline if one.asked]
+        lines += [printable(one.sentence) for one in (*each.headline, *each.weighted)]
+        lines += [printable(one.beside) for one in each.headline if one.asked]
         if each.simulated is not None:
-            lines.append(plain(each.simulated.sentence))
+            lines.append(printable(each.simulated.sentence))
         lines.append("")
     if found.benchmark is not None:
         lines += [found.benchmark.sentence, ""]

@@ -27,7 +27,7 @@ from .options import ONE_FRAME, OVER_TIME, SHARED, add_options, query_options
 from .path_type import ANY_PATH
 from .programs import PROGRAM_TEXT, SCENARIO, given_program
 from .remarks import remarks, show_remarks
-from .report import plain
+from .report import printable
 from .streams import say
 
 __all__ = ["explain"]
@@ -38,10 +38,10 @@ __all__ = ["explain"]
     arguments={
         "SCENARIO": SCENARIO,
         "DATASET": "A folder that `scenicq ingest` made.",
-        "FRAME": "The name of a frame, as `scenicq match` prints it, or as much of it as no other frame has; of a "
-        "program about what happens over time the frame in which the interval begins, or the name of a recording, and "
-        "after `@` when the interval begins: a timestamp, or the seconds from where the recording begins (`@3.5s`). "
-        "Intervals in which a frame lies without being their first are named, too.",
+        "FRAME": "The name of a frame as `scenicq match` prints it, or a part of it that no other frame has. For a "
+        "program about time: the first frame of the interval, or RECORDING, or RECORDING@TIME for the interval that "
+        "begins then (a timestamp, or seconds from the start of the recording, as in `@3.5s`). Intervals that begin "
+        "earlier and contain the frame are named, too.",
     },
     exits={
         0: "the frame or recording matches",
@@ -79,7 +79,7 @@ def explain(
     if over_time and (moment := named_moment(query.dataset, str(named))) is not None:
         with LazySolver(query.options.solver) as solver:
             about = explain_recording(query, solver, *moment)
-        say(plain(about.text()))
+        say(printable(about.text()))
         if not about.matches and not exit_zero:
             ctx.exit(UNDECIDED if about.is_unknown else NOTHING)
         return
@@ -91,7 +91,7 @@ def explain(
         verdict, told = explanation.verdict, show_explanation(explanation)
         if over_time:
             verdict, told = explain_beginning(query, solver, label)
-    say(plain(told))
+    say(printable(told))
     if smt2 is not None:
         try:
             with target_of(smt2).made_folder():

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Protocol, TextIO
 
 from msgspec import UNSET, structs
 
-from scenicq.errors import plain_json
+from scenicq.errors import printable_json
 from scenicq.query.execution.csv_cells import SPREADSHEET_MARK, quote_cell
 from scenicq.query.execution.recorded_columns import RecordedColumn, cells_of_row
 from scenicq.query.execution.records import (
@@ -24,7 +24,7 @@ from scenicq.query.execution.result_summary import ResultSummary
 from scenicq.query.execution.result_tables import result_schema, result_table, summary_metadata
 from scenicq.store.frame_names import ShortNames
 
-from .report import plain
+from .report import printable
 from .table import Table, TextStream
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ class _Names:
 
     def write(self, record: Record) -> None:
         if record.verdict == "match":
-            self._text.write(plain(record.name).replace("\n", "\\n") + "\n")
+            self._text.write(printable(record.name).replace("\n", "\\n") + "\n")
             self._text.flush()
 
     def finish(self, summary: ResultSummary | None = None) -> None:
@@ -132,7 +132,7 @@ class _JsonLines:
         self._text = text
 
     def write(self, record: Record | SummaryRecord) -> None:
-        self._text.write(plain_json(json_text(record)) + "\n")
+        self._text.write(printable_json(json_text(record)) + "\n")
         self._text.flush()
 
 
@@ -159,10 +159,10 @@ class _Csv:
                 if cell is UNSET
                 else cell
                 if isinstance(cell, str | float | None) or type(cell) is int
-                else plain_json(json_text(cell))
+                else printable_json(json_text(cell))
                 for name, cell in cells.items()
             }
-            | {name: None if cell is None else plain_json(cell) for name, cell in recorded.items()}
+            | {name: None if cell is None else printable_json(cell) for name, cell in recorded.items()}
         )
         self._text.flush()
 

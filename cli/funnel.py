@@ -92,7 +92,7 @@ def _over_time(funnel: Funnel) -> list[tuple[str, str]]:
     told = {
         "starts": "frames that match the initial scene",
         "bindings": "ways to give the objects tracks from there on",
-        "cut off": "of these ways cut off: the recording or a track ends before the program",
+        "cut off": "ways cut off, as the recording or a track ends before the program",
     }
     return [(f"{funnel.over_time[name]:,}", text) for name, text in told.items()] if funnel.over_time else []
 
@@ -124,8 +124,8 @@ def _defaults(query: Query) -> list[str]:
     frames = sum(left_out.values())
     names = ", ".join(f"`{name}`" for name in named)
     return [
-        f"  {count(frames, 'frame')} failed first at {names}, of which the program says nothing: by default it is",
-        "    that of the road; `facing Range(-180, 180) deg` takes any direction",
+        f"  {count(frames, 'frame')} failed first at {names}, which the program leaves to the default, the",
+        "    direction of the road; `facing Range(-180, 180) deg` takes any direction",
     ]
 
 

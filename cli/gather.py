@@ -42,12 +42,12 @@ __all__ = ["gather"]
               help="table, jsonl, csv, spreadsheet, parquet or ids.  [default: as for `match`]")  # fmt: skip
 @click.option("-o", "--output", metavar="FILE", type=ANY_PATH, help="Write to a file, also to s3://...")
 @click.option("--export", metavar="FORM DIR", type=(click.Choice(FORMS), ANY_PATH),
-              help="Hand the matching frames on, too, in a new folder DIR; as for `match`.")  # fmt: skip
+              help="Also export the matching frames to a new folder DIR; as for `match`.")  # fmt: skip
 @click.option("--report", metavar="DIR", type=ANY_PATH,
-              help="Write a page with pictures of the matches, too: DIR/index.html.")  # fmt: skip
+              help="Also write a page with pictures of the matches: DIR/index.html.")  # fmt: skip
 @add_options(QUERY_OPTIONS, "where", "sort")
 @SENSORS
-@click.option("--exit-zero", is_flag=True, help="Exit with 0 also where nothing matches, or something is undecided.")
+@click.option("--exit-zero", is_flag=True, help="Exit with 0 also if nothing matches, or if something is undecided.")
 @click.pass_context
 def gather(ctx: click.Context, folder: AnyPath, *, format_: str | None, output: AnyPath | None,
            export: tuple[str, AnyPath] | None, report: AnyPath | None, sensors: Path | None,

@@ -10,7 +10,7 @@ from scenicq.store.rebuild import rebuild
 from .manual import Manual
 from .output import ProgressBar
 from .report import count
-from .sources import recorded, remember
+from .sources import recorded_source, remember
 
 __all__ = ["index"]
 
@@ -29,7 +29,7 @@ def index(dataset: str, *, quiet: bool) -> None:
     once. Labels, objects, sensor paths and maps stay as they are. A dataset of an older version is brought up to date.
     """
     opened = open_dataset(dataset, older=True, check=False)
-    source = recorded(opened)
+    source = recorded_source(opened)
     with ProgressBar(opened.manifest.total.frames, quiet=quiet) as bar:
         manifest = rebuild(opened, bar.advance)
     if source is not None:

@@ -9,7 +9,7 @@ from contextlib import closing
 
 import click
 
-from scenicq.errors import plain_json
+from scenicq.errors import printable_json
 from scenicq.store.dataset import Dataset
 from scenicq.store.manifest import Counts, Manifest
 from scenicq.store.map_fit import MapFit, map_fits, misfits
@@ -23,7 +23,7 @@ from scenicq.store.verification import verify_computed
 from .datasets import open_checked
 from .ingest import defects
 from .manual import Manual
-from .report import columns, count, is_date, moment, plain, show_few
+from .report import columns, count, is_date, moment, printable, show_few
 from .streams import say
 
 __all__ = ["info"]
@@ -60,7 +60,7 @@ def _values(said: SaidValues) -> str:
 
 
 def _short(text: str) -> str:
-    told = plain(text).replace("\n", " ")
+    told = printable(text).replace("\n", " ")
     return told if len(told) <= _WIDEST else f"{told[: _WIDEST - 3]}..."
 
 
@@ -85,12 +85,12 @@ def _questions(dataset: Dataset, observed: ObservedMotion) -> list[str]:
     if observed.steps is None:
         over_time = "no, as no recording has two labels"
     elif not manifest.tracks:
-        over_time = "of the ego alone, as objects have no tracks"
+        over_time = "for the ego alone, as objects have no tracks"
     else:
         over_time = f"yes, by {count(manifest.tracks, 'track')}"
     roads = f"yes, {count(rows['lanes'], 'lane')}" if rows["lanes"] else "no, as there is no map with lanes"
     if rows["lanes"] and without_map:
-        roads += f"; not on {', '.join(without_map)}, of which there is no map"
+        roads += f"; not for {', '.join(without_map)}, which have no map"
     known = observed.known.get("velocity of objects")
     share = (known.own + known.derived) / known.total if known is not None and known.total else 0.0
     told = [
@@ -221,11 +221,11 @@ def info(dataset: str, *, verify: bool, named: bool, format_: str) -> None:
             check_dataset(opened.place, opened.manifest)
             verify_computed(opened)
     if format_ == "json":
-        say(plain_json(opened.manifest.to_json()), nl=False)
+        say(printable_json(opened.manifest.to_json()), nl=False)
     else:
         with opened.blamed():
             fits = map_fits(opened)
             lines = [*_lines(opened, fits, named=named)]
         show_few(misfits(fits))
         lines += ["every checksum is right, and every value is sound"] if verify else []
-        say(plain("\n".join(lines)))
+        say(printable("\n".join(lines)))

@@ -18,13 +18,13 @@ import click
 
 from scenicq import __version__
 from scenicq.errors import Diagnostic, ScenicqError, similar
-from scenicq.garbage import seldom_collected
+from scenicq.garbage import collect_seldom
 from scenicq.refusals import refused_by_system
 
 from .interrupts import Interrupts
 from .manual import OPEN, write_examples, write_exit_codes
 from .report import show
-from .streams import only_results
+from .streams import redirect_prints
 
 __all__ = ["COMMANDS", "NOTHING", "UNDECIDED", "cli", "main"]
 
@@ -76,13 +76,13 @@ class Commands(click.Group):
         """Import a subcommand."""
         if cmd_name not in COMMANDS:
             return None
-        with only_results():
+        with redirect_prints():
             module = import_module(f"{__package__}.{_MODULES.get(cmd_name, cmd_name)}")
         if not gc.isenabled():
             # the process is our own (`main`), and what is loaded stays: neither now nor at the end need the collector
             # go through it; DuckDB, which reports what is never freed, is loaded later
             gc.freeze()
-            seldom_collected()
+            collect_seldom()
         command: click.Command = getattr(module, cmd_name)
         return command
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from .streams import only_results
+from .streams import redirect_prints
 
 __all__ = ["OPEN", "Manual", "variable_of", "write_examples", "write_exit_codes"]
 
@@ -82,7 +82,7 @@ class Manual(click.Command):
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command; standard output is for its results alone."""
-        with only_results():
+        with redirect_prints():
             return super().invoke(ctx)
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:

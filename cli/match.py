@@ -18,7 +18,7 @@ from scenicq.errors import Diagnostic
 from scenicq.exporters.forms import FORMS
 from scenicq.match.verdict import Match, Unknown
 from scenicq.option_values import Amount, Count
-from scenicq.query.execution.executors import Executor, in_order, on_this_machine, resumed, usual_pieces
+from scenicq.query.execution.executors import Executor, local_executor, ordered_results, resumable, usual_pieces
 from scenicq.query.execution.option_texts import QUERY_OPTIONS
 from scenicq.query.execution.result_summary import ResultSummary
 from scenicq.query.execution.results import Result, Sample
@@ -95,20 +95,21 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
 @PROGRAM_TEXT
 @add_options(QUERY_OPTIONS, *SHARED, *OVER_TIME, "intervals", "prefilter", "jobs", "limit")
 @click.option("--deadline", metavar="S", type=OptionType(Amount("s", above=True)),
-              help="Stop after S seconds, or 5min, 2h: what is "
-              "decided by then is written, the rest is counted, and `--resume` goes on.")
+              help="Stop after S seconds, or 5min, 2h. "
+              "What is decided by then is written, and the rest is counted; `--resume` goes on.")
 @add_options(QUERY_OPTIONS, "every", "all_matches")
-@click.option("--near", metavar="K", type=OptionType(Count()), help="Show the K frames, too, that do not match but "
-              "come closest, each with the tolerance under which it would; over time K recordings, each with the "
-              "tolerance, the number of the program or the duration with which it would.")
+@click.option("--near", metavar="K", type=OptionType(Count()), help="Also show the K frames that come "
+              "closest to a match, each with the tolerance under which it would match. Over time: the K recordings "
+              "that come closest, each with a tolerance, a number of the program or a duration that would do.")
 @add_options(QUERY_OPTIONS, "where", "sort")
 @click.option("--rank", is_flag=True, help="Order matches from typical to borderline: by the density with which the "
               "program generates what the label observes.")
 @click.option("--sample", metavar="N", type=OptionType(Count()), help="Show N of the matches, drawn at random.")
 @click.option("--diverse", is_flag=True, help="With --sample: matches that spread over recordings and over the "
               "program's random variables.")
-@click.option("--advise", "advised", is_flag=True, help="Say which condition excludes most, and how many frames each "
-              "single change of the program would leave. Without it, this is said where hardly any frame matches.")
+@click.option("--advise", "advised", is_flag=True, help="Say which condition excludes most frames, and how "
+              "many would match after each single change of the program. Where hardly any frame matches, this is said "
+              "without the option, too.")
 @click.option("--format", "format_", metavar="NAME", type=click.Choice(FORMATS),
               help="table, jsonl, csv, spreadsheet, parquet or ids.  [default: by the extension of FILE, else table on "
               f"a terminal and jsonl in a pipe]  {SPREADSHEET_HELP}")
@@ -120,15 +121,15 @@ def _near(query: Query, count: int | None) -> Iterator[Result]:
               "on this machine (--jobs of them, or one a processor), or on the cluster whose scheduler is at ADDRESS.")
 @click.option("--resume", is_flag=True, help="Go on where an interrupted run with the same -o FILE stopped.")
 @click.option("--export", metavar="FORM DIR", type=(click.Choice(FORMS), ANY_PATH),
-              help="Hand the matching frames on, too, in a new folder DIR, also s3://...: nuscenes-tokens, argoverse2, "
-              "paths (of sensor files), interchange (to ingest elsewhere) or openlabel.")
+              help="Also export the matching frames to a new folder DIR, also s3://..., as nuscenes-tokens, "
+              "argoverse2, paths (of sensor files), interchange (to ingest elsewhere) or openlabel.")
 @click.option("--explain", is_flag=True,
-              help="Print what SQL decides and what stays for the matcher, and match nothing.")
+              help="Print what SQL decides and what is left for the matcher; match nothing.")
 @click.option("--report", metavar="DIR", type=ANY_PATH,
-              help="Write a page with pictures of the matches, too: DIR/index.html, also in s3://...")
+              help="Also write a page with pictures of the matches: DIR/index.html, also in s3://...")
 @SENSORS
-@click.option("--exit-zero", is_flag=True, help="Exit with 0 also where nothing matches, or something is undecided.")
-@click.option("--summary", is_flag=True, help="Print the summary also where stderr is not a terminal.")
+@click.option("--exit-zero", is_flag=True, help="Exit with 0 also if nothing matches, or if something is undecided.")
+@click.option("--summary", is_flag=True, help="Print the summary also if stderr is not a terminal.")
 @click.option("-q", "--quiet", is_flag=True, help="No progress, no summary.")
 @click.pass_context
 def match(ctx: click.Context, scenario: str | None, dataset: str | None, *, program: str | None, format_: str | None,
@@ -187,9 +188,12 @@ def match(ctx: click.Context, scenario: str | None, dataset: str | None, *, prog
     if resume and file is not None:
         real = Path(os.path.realpath(file)) if isinstance(file, Path) else file
         pieces = real.with_name(f".{real.name}.pieces")
-        engine = resumed(pieces, engine or on_this_machine(query))
+        engine = resumable(pieces, engine or local_executor(query))
     bar = ProgressBar(query.dataset.manifest.total.frames, quiet=quiet)
-    results = in_order(query, engine, usual_pieces(query, 16), bar.advance) if engine else query.results(bar.advance)
+    if engine is None:
+        results = query.results(bar.advance)
+    else:
+        results = ordered_results(query, engine, usual_pieces(query, 16), bar.advance)
     wanted = Wanted(file, chosen, export, report, pieces, sensors, ranked=rank)
 
     def drawn(found: Generator[Result]) -> Generator[Result]:
@@ -238,7 +242,7 @@ def _tell_far(query: Query) -> None:
     """Say that nothing came close."""
     what = "recording" if query.is_over_time() else "frame"
     message = f"--near shows nothing: no {what} that was looked at would match with a wider tolerance"
-    hints = ("no tolerance holds in requirements: `--advise` tells which change of the program would do",)
+    hints = ("tolerances do not apply to requirements: `--advise` says which change of the program would help",)
     show([Diagnostic("option-invalid", message, hints=hints, severity="warning")])
 
 

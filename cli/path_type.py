@@ -36,7 +36,7 @@ class AnyPathType(_PathType):
         if not isinstance(value, str):
             return value
         if value.startswith("memory://"):
-            message = f"{value}: what is written to the memory of this process is gone with it"
+            message = f"{value}: this is in the memory of the process, which ends with the command"
             raise DataError(Diagnostic("option-invalid", message, hints=("name a file, or an address as s3://...",)))
         return any_path(value)
 

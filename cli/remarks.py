@@ -11,7 +11,7 @@ from scenicq.errors import Diagnostic, ScenarioError
 from scenicq.lint.program import lint_query
 from scenicq.query.execution.run import Query
 
-from .report import count, plain, show
+from .report import count, printable, show
 
 __all__ = ["remarks", "show_remarks"]
 
@@ -52,7 +52,7 @@ def show_remarks(query: Query, unseen: Iterable[Diagnostic], found: Sequence[Dia
     for each in found[:_LINES]:
         place = f"{each.span.place}: " if each.span is not None else ""
         kind = click.style(f"{each.severity}[{each.code}]", fg="yellow", bold=True)
-        click.echo(f"{kind}: {place}{plain(each.message)}", err=True)
+        click.echo(f"{kind}: {place}{printable(each.message)}", err=True)
     if found:
         more = f"{count(len(found) - _LINES, 'more warning')}: " if len(found) > _LINES else ""
-        click.echo(f"  = hint: {more}`scenicq check {plain(query.source.name)}` says what to write", err=True)
+        click.echo(f"  = hint: {more}`scenicq check {printable(query.source.name)}` says what to write", err=True)

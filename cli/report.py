@@ -10,9 +10,9 @@ from typing import Any
 
 import click
 
-from scenicq.errors import Diagnostic, Span, plain, render
+from scenicq.errors import Diagnostic, Span, printable, render
 
-__all__ = ["as_json", "columns", "count", "is_date", "moment", "plain", "show", "show_few"]
+__all__ = ["as_json", "columns", "count", "is_date", "moment", "printable", "show", "show_few"]
 
 _FEW = 5
 """Diagnostics of one code shown at most, where there may be many."""
@@ -25,7 +25,7 @@ _FIRST_US, _LAST_US = 946_684_800_000_000, 4_102_444_800_000_000
 def show(diagnostics: Iterable[Diagnostic]) -> None:
     """Print diagnostics on standard error, with the headline in colour."""
     for diagnostic in diagnostics:
-        headline, _, rest = plain(render(diagnostic)).partition("\n")
+        headline, _, rest = printable(render(diagnostic)).partition("\n")
         kind, colon, message = headline.partition(":")
         colour = "red" if diagnostic.severity == "error" else "yellow"
         text = click.style(kind, fg=colour, bold=True) + click.style(colon + message, bold=True)
@@ -79,7 +79,7 @@ def columns(rows: Sequence[Sequence[str]], *, right: frozenset[int] = frozenset(
         right: Indices of the columns that are aligned to the right.
         indent: What every line starts with.
     """
-    rows = [[plain(cell).replace("\n", "\\n") for cell in row] for row in rows]
+    rows = [[printable(cell).replace("\n", "\\n") for cell in row] for row in rows]
     widths = [max(len(row[number]) for row in rows) for number in range(len(rows[0]))] if rows else []
     return [
         indent

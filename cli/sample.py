@@ -8,7 +8,7 @@ import click
 
 from scenicq.compiler.element_lookups import LaneRule
 from scenicq.compiler.program import compile_scenario
-from scenicq.errors import plain_json
+from scenicq.errors import printable_json
 from scenicq.exporters.sample import PATIENCE_S, sample_labels, sample_record, write_sample
 from scenicq.option_values import SEED, Count, read_values
 from scenicq.query.execution.option_texts import QUERY_OPTIONS, read_built_ins
@@ -61,9 +61,9 @@ def sample(ctx: click.Context, scenario: str | None, dataset: str | None, *, pro
            output: AnyPath | None) -> None:  # fmt: skip
     """Draw scenes from a scenario, as labels.
 
-    They have the distribution of the program, given that all requirements hold, those that Scenic adds included. On
-    the first map of the dataset, the map that is given, the one that the program names with `param map =
-    localPath('FILE')`, or else a small built-in street. One line of JSON a scene.
+    Scenes have the distribution of the program, given that all requirements hold, also those that Scenic adds. They
+    lie on the first map of the dataset, or on the map that is given, or on the one that the program names with `param
+    map = localPath('FILE')`, or else on a small built-in street. Each is a line of JSON.
     """
     source, (target,), model = given_program(ctx, program, (scenario, dataset))
     read = read_values(QUERY_OPTIONS, {"scenic": scenic, "params": params})
@@ -86,4 +86,4 @@ def sample(ctx: click.Context, scenario: str | None, dataset: str | None, *, pro
         write_sample(labels, network, Path(source.name.strip("<>")).stem, output)
         return
     for label in labels:
-        say(plain_json(sample_record(label)))
+        say(printable_json(sample_record(label)))

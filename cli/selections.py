@@ -11,8 +11,8 @@ __all__ = ["tell_unclear"]
 
 
 def tell_unclear(selection: ResultSelection) -> None:
-    """Say that a condition is not known of some matches."""
-    what = f"of {count(selection.unclear, 'match')} it is not known whether --where holds"
-    message = f"{what}, as what is recorded is null: left out"
-    hints = ("`unrecorded` of results says why",)
+    """Say how many matches are left out because a condition on them is not known."""
+    left_out = count(selection.unclear, "match")
+    message = f"{left_out} left out: whether --where holds is not known, because a recorded value is null"
+    hints = ("`unrecorded` in the results says why",)
     show([Diagnostic("results-incomplete", message, hints=hints, severity="warning")])

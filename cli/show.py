@@ -73,8 +73,8 @@ def _shot(dataset: Dataset, label: Label, scenario: Path | None, given: dict[str
     cls=Manual,
     arguments={
         "DATASET": "A folder that `scenicq ingest` made.",
-        "FRAME": "The name of a frame, as `scenicq match` prints it, or as much of it as no other frame has; or of a "
-        "recording, and after `@` a timestamp, or the seconds from where the recording begins (`@3.5s`).",
+        "FRAME": "The name of a frame as `scenicq match` prints it, or a part of it that no other frame has; or "
+        "RECORDING@TIME (a timestamp, or seconds from the start of the recording, as in `@3.5s`).",
     },
     topics={"What counts as a match, with --scenario": SHARED, "Over time": OVER_TIME},
     epilog="\b\nExamples:\n"

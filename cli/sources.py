@@ -1,7 +1,8 @@
-"""Where the sensor files of a dataset are: only this user says, never the dataset itself.
+"""The folder in which the sensor files of a dataset are, as this user has said it, never as the dataset says.
 
-A dataset says where it was made from; but it may be a stranger's, and a report has small images in it of the files that
-it names. So the folder counts that this user gave to `ingest` when making just this dataset, or gives now.
+A dataset names the folder that it was made from. But a dataset may come from a stranger, and a report shows small
+images of the files that it names. So only two folders count: the one from which this user ingested just this dataset,
+and the one that `--sensors` gives.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from .user_folders import state_folder
 if TYPE_CHECKING:  # an ingest needs no DuckDB, which comes with this
     from scenicq.store.dataset import Dataset
 
-__all__ = ["SENSORS", "is_noted_sound", "note_sound", "recorded", "remember", "sensor_root"]
+__all__ = ["SENSORS", "is_noted_sound", "note_sound", "recorded_source", "remember", "sensor_root"]
 
 SENSORS = click.option(
     "--sensors",
@@ -34,7 +35,7 @@ SENSORS = click.option(
     type=LocalPathType(path_type=Path, exists=True, file_okay=False),
     help="The folder that the paths of sensor files start from.  [default: the source, if you ingested it here]",
 )
-"""The option by which a user says so."""
+"""The option for that folder."""
 
 
 def remember(folder: Path, source: Path) -> None:
@@ -79,7 +80,7 @@ def _sound() -> SoundNotes:
     return SoundNotes(state_folder() / "sound")
 
 
-def recorded(dataset: Dataset) -> Path | None:
+def recorded_source(dataset: Dataset) -> Path | None:
     """The source that this user made a dataset from, wherever the dataset is now; None if somebody else made it."""
     digest = _digest(dataset.place.manifest())
     found = None
@@ -91,15 +92,15 @@ def recorded(dataset: Dataset) -> Path | None:
 
 
 def sensor_root(dataset: Dataset, given: Path | None) -> Path | None:
-    """The folder that the paths of sensor files start from; a warning where nobody has said so.
+    """The folder that the paths of sensor files start from; None, with a warning, if nobody has said it.
 
     Args:
-        dataset: The dataset, in whose own folder they may always lie.
-        given: What the user gives.
+        dataset: The dataset; files in its own folder are found in any case.
+        given: The folder that the user gives, if any.
     """
-    root = given or recorded(dataset)
+    root = given or recorded_source(dataset)
     if root is None and any(part.rows for part in dataset.manifest.tables["sensors"]):
-        message = f"sensor files are looked for in {dataset.name} alone: it was not made here, or not by you"
+        message = f"only {dataset.name} itself is searched for sensor files: it was not made here, or not by you"
         hint = "`--sensors DIR` gives the folder that their paths start from"
         show([Diagnostic("file-missing", message, hints=(hint,), severity="warning")])
     return root

@@ -12,14 +12,14 @@ from typing import TextIO
 
 import click
 
-__all__ = ["only_results", "results", "say"]
+__all__ = ["redirect_prints", "results", "say"]
 
 _STREAMS: list[TextIO] = []
 """Standard output as it was when the command began, of commands that run within each other."""
 
 
 @contextlib.contextmanager
-def only_results() -> Generator[None]:
+def redirect_prints() -> Generator[None]:
     """In the block, what libraries print in Python goes to standard error; `results` is standard output."""
     _STREAMS.append(sys.stdout)
     try:

@@ -16,9 +16,9 @@ from scenicq.query.execution.result_summary import ResultSummary
 from scenicq.query.execution.results import ModeRecord
 from scenicq.store.frame_names import ShortNames
 
-from .report import columns, moment, plain
+from .report import columns, moment, printable
 
-__all__ = ["Table", "TextStream", "fitted"]
+__all__ = ["Table", "TextStream", "table_lines"]
 
 _INTERVAL_HEAD = ("RECORDING", "START", "SECONDS", "VERDICT", "OBJECTS", "FRAMES")
 _HEAD = ("FRAME", "RECORDING", "TIME", "VERDICT", "OBJECTS", "SENSOR")
@@ -86,14 +86,14 @@ class Table:
         """The rows that are held back stay there."""
 
     def finish(self, summary: ResultSummary | None = None) -> None:
-        """Write the rows that are held back; a table is for people, whom standard error tells the rest."""
+        """Write the rows that are held back; the summary is not of the table: standard error has it for people."""
         if not self._rows:
             return
         lines = columns([_INTERVAL_HEAD if self._over_time else _HEAD, *self._rows], indent="")
         if self._width is not None and max(map(len, lines)) > self._width:
             if self._short is None:
                 self._short = self._shorten() if self._shorten is not None else ShortNames(str, str)
-            lines = fitted(self._rows, self._width, self._short, over_time=self._over_time)
+            lines = table_lines(self._rows, self._width, self._short, over_time=self._over_time)
         verdicts = iter(self._rows)
         colour = None
         for number, line in enumerate(lines):
@@ -103,7 +103,7 @@ class Table:
         self._rows.clear()
 
 
-def fitted(rows: list[Row], width: int, short: ShortNames, *, over_time: bool = False) -> list[str]:
+def table_lines(rows: list[Row], width: int, short: ShortNames, *, over_time: bool = False) -> list[str]:
     """Lay rows out as lines of a table of at most a width, the head first; no word is broken.
 
     Names are cut to what tells them apart; what all rows share, or other columns say, is left out; long cells go on
@@ -155,7 +155,7 @@ def fitted(rows: list[Row], width: int, short: ShortNames, *, over_time: bool = 
 
 def _fits(head: Sequence[str], table: Sequence[Sequence[str]], kept: list[int], width: int) -> bool:
     """Whether rows fit without breaking long cells."""
-    widths = [max(len(plain(row[column])) for row in (head, *table)) for column in kept]
+    widths = [max(len(printable(row[column])) for row in (head, *table)) for column in kept]
     return sum(widths) + 2 * (len(kept) - 1) <= width
 
 
@@ -189,7 +189,7 @@ def _narrowest(table: Sequence[Sequence[str]], kept: list[int]) -> int:
 
 
 def _wrapped(table: Sequence[Sequence[str]], kept: list[int], width: int) -> list[str]:
-    widths = {column: max(len(plain(row[column])) for row in table) for column in kept}
+    widths = {column: max(len(printable(row[column])) for row in table) for column in kept}
     room = width - sum(widths[column] for column in kept if column not in (_VERDICT, _OBJECTS)) - 2 * (len(kept) - 1)
     least = _longest_word(table, _VERDICT)
     if widths[_VERDICT] + widths[_OBJECTS] > room:
@@ -198,8 +198,9 @@ def _wrapped(table: Sequence[Sequence[str]], kept: list[int], width: int) -> lis
         widths[_OBJECTS] = max(_longest_word(table, _OBJECTS), room - widths[_VERDICT])
     lines: list[str] = []
     for row in table:
+        texts = {column: printable(row[column]) for column in kept}
         cells = [
-            textwrap.wrap(plain(row[column]), widths[column], break_long_words=False, break_on_hyphens=False) or [""]
+            textwrap.wrap(texts[column], widths[column], break_long_words=False, break_on_hyphens=False) or [""]
             for column in kept
         ]
         for number in range(max(map(len, cells))):

@@ -30,10 +30,10 @@ __all__ = [
     "leave_out",
     "limited",
     "look",
+    "stop_clock",
     "time_is_up",
     "time_left_s",
     "trials_left",
-    "uncounted",
     "waiting",
 ]
 
@@ -230,7 +230,7 @@ def waiting(seconds: float) -> Generator[float]:
 
 
 @contextmanager
-def uncounted() -> Generator[None]:
+def stop_clock() -> Generator[None]:
     """Within `waiting`, what is no fault of the label, such as starting a process: it takes no time."""
     began = time.perf_counter()
     try:

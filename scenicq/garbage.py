@@ -6,20 +6,20 @@ import gc
 from collections.abc import Generator
 from contextlib import contextmanager
 
-__all__ = ["seldom_collected", "without_collector"]
+__all__ = ["collect_seldom", "pause_collector"]
 
 _YOUNG = 50_000
 """Records that are made before the collector looks at them: by then most are gone, and few cycles are kept waiting."""
 
 
-def seldom_collected() -> None:
+def collect_seldom() -> None:
     """Let the collector run, but seldom, in a process that is the program's own."""
     gc.set_threshold(_YOUNG, 10, 10)
     gc.enable()
 
 
 @contextmanager
-def without_collector() -> Generator[None]:
+def pause_collector() -> Generator[None]:
     """Keep the collector from walking through all records again and again."""
     collects = gc.isenabled()
     gc.disable()

@@ -15,7 +15,7 @@ from typing import Any, cast
 
 from scenicq.budget import Exhausted
 
-__all__ = ["LIMITS", "Beyond", "Limit", "Limits", "exhausted", "limits"]
+__all__ = ["LIMITS", "Beyond", "Limit", "Limits", "limit_exceeded", "limits"]
 
 
 class Beyond(Enum):
@@ -25,7 +25,7 @@ class Beyond(Enum):
     REFUSED = "refused"
     OTHERWISE = "another way gives the same answer"
     COARSER = "less is known, which leaves more to other ways, or unknown"
-    SHORTER = "people are told less"
+    SHORTER = "less is reported"
 
 
 @dataclass(frozen=True, slots=True)
@@ -286,7 +286,7 @@ class Limits:
     outcomes_over_time: int = _undecided(
         3000,
         "outcomes",
-        "of the choices that conditions over time hang on",
+        "of the choices that conditions over time depend on",
         "too many outcomes of random choices to tell apart",
     )
     direction_choices: int = _undecided(
@@ -403,7 +403,7 @@ def limits() -> Iterator[Limit]:
         yield Limit(each.name, value, told["unit"], told["guards"], told["beyond"], told["more"])
 
 
-def exhausted(name: str) -> Exhausted:
+def limit_exceeded(name: str) -> Exhausted:
     """What ends a search at a limit that leaves it undecided: the reason, and in words which limit it was."""
     told = Limits.__dataclass_fields__[name].metadata
     return Exhausted(told["more"], f"more than {getattr(LIMITS, name):,} {told['unit']} {told['guards']}")

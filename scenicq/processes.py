@@ -20,7 +20,7 @@ from types import ModuleType, TracebackType
 from typing import TYPE_CHECKING, Any, Generic, Self, TypeVar
 
 from scenicq.errors import DataError, Diagnostic
-from scenicq.garbage import seldom_collected
+from scenicq.garbage import collect_seldom
 from scenicq.refusals import refused_by_system
 
 if TYPE_CHECKING:  # whoever starts no process need not load what starts them
@@ -32,12 +32,12 @@ __all__ = [
     "Lost",
     "Work",
     "Workers",
-    "as_many_as_pay",
+    "default_processes",
     "discard_output",
     "end_group",
-    "ended_after",
+    "kill_after",
+    "kill_on_exit",
     "lead_output_away",
-    "leashed",
     "limit_memory",
     "processors",
 ]
@@ -46,7 +46,7 @@ Task = TypeVar("Task")
 Answer = TypeVar("Answer")
 
 Work = Callable[[Task, Callable[[Any], None]], Answer]
-"""Does a task in a worker; the second argument sends a value to whoever waits for the answer."""
+"""Does a task in a worker; the second argument sends a value to the process that waits for the answer."""
 
 _STARTS, _KILLED_STARTS = 3, 30
 """Processes in a row that may end before they have started: of those that end by themselves, and of those killed."""
@@ -303,7 +303,7 @@ def _serve(connection: Connection[Any, Any], start: Callable[..., Work[Any, Any]
         signal.pthread_sigmask(signal.SIG_UNBLOCK, _interrupts())
     parent = multiprocessing.parent_process()
     assert parent is not None
-    seldom_collected()
+    collect_seldom()
     work: Work[Any, Any] | None = None
     with contextlib.suppress(EOFError, OSError):
         try:
@@ -355,7 +355,7 @@ def discard_output() -> Generator[None]:
 
 
 @contextlib.contextmanager
-def ended_after(process: subprocess.Popen[bytes], seconds: float) -> Generator[threading.Event]:
+def kill_after(process: subprocess.Popen[bytes], seconds: float) -> Generator[threading.Event]:
     """End a process with its group if the block takes longer; the event says whether it did.
 
     Args:
@@ -384,7 +384,7 @@ def end_group(process: subprocess.Popen[bytes]) -> None:
 
 
 @contextlib.contextmanager
-def leashed(words: Sequence[str]) -> Generator[tuple[Sequence[str], tuple[int, ...]]]:
+def kill_on_exit(words: Sequence[str]) -> Generator[tuple[Sequence[str], tuple[int, ...]]]:
     """Have a command be killed with its process group when the block or this process ends, however it ends.
 
     Args:
@@ -425,7 +425,7 @@ def processors() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def as_many_as_pay() -> int:
+def default_processes() -> int:
     """How many processes to use where nobody says how many."""
     return min(processors(), _AT_MOST)
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from scenicq import limits as module
-from scenicq.limits import LIMITS, Beyond, Limits, exhausted, limits
+from scenicq.limits import LIMITS, Beyond, Limits, limit_exceeded, limits
 
 LIBRARY = Path(module.__file__).parent
 PAGE = LIBRARY / "limits.md"
@@ -23,6 +23,7 @@ NO_LIMITS = {
     "forest/improvise.py": "_PATIENCE: when regions are cut, which takes none away",
     "forest/step_counts.py": "FEWEST, LONGEST: Scenic's steps",
     "geometry/direction_surroundings.py": "_LARGEST: a size of squares",
+    "geometry/driven_courses.py": "_FEW: pairs that are looked at without a search tree",
     "match/decide/decomposition.py": "_FEW_OPTIONS: which of two ways comes first",
     "match/fields/witness_search.py": "_FEW: draws of a search that has nowhere to go",
     "query/execution/result_files.py": "_LONGEST: what a cell of a file may be",
@@ -83,18 +84,18 @@ def test_each_limit_is_read_and_each_that_is_read_stands_in_the_table():
 def test_what_ends_undecided_says_why_and_which_limit_it_was():
     told = {each.name: each for each in limits()}
     assert all(bool(each.more) == (each.beyond not in (Beyond.REFUSED, Beyond.SHORTER)) for each in told.values())
-    raised = {name for _, text in sources() for name in re.findall(r'\bexhausted\("(\w+)"\)', text)}
+    raised = {name for _, text in sources() for name in re.findall(r'\blimit_exceeded\("(\w+)"\)', text)}
     assert len(raised) > 8
     for name in raised:
         assert name in told
-        error = exhausted(name)
+        error = limit_exceeded(name)
         assert error.reason
         assert error.detail == f"more than {told[name].value:,} {told[name].unit} {told[name].guards}"
 
 
 def test_what_is_raised_has_the_limit_that_holds(monkeypatch):
     monkeypatch.setattr(LIMITS, "signatures", 3)
-    assert exhausted("signatures").detail.startswith("more than 3 signatures")
+    assert limit_exceeded("signatures").detail.startswith("more than 3 signatures")
 
 
 def names(tree: ast.Module) -> Iterator[str]:

@@ -1,4 +1,4 @@
-"""What a program asks of a map that has none of it: no frame on that map can match, and whoever runs it is told."""
+"""What a program asks of a map that has none of it: no frame on that map can match, and the user is told."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from scenicq.forest.walk import children
 from scenicq.geometry.regions import DifferenceOf, IntersectionOf, PolygonSet, PolylineSet, UnionOf
 from scenicq.geometry.road_direction import RoadDirection
 
-__all__ = ["absent_parts", "check_directions", "check_enforced", "listed"]
+__all__ = ["absent_parts", "check_directions", "check_enforced", "list_names"]
 
 
 def absent_parts(area: Node) -> tuple[str, ...] | None:
@@ -85,7 +85,7 @@ def _absent(value: Value) -> tuple[str, ...] | None:
 
 
 def check_directions(objects: Iterable[ScenarioObject], requirements: Iterable[Requirement]) -> None:
-    """Refuse what hangs on a direction of traffic on a map that has none: no label could ever match.
+    """Refuse what depends on a direction of traffic on a map that has none: no label could ever match.
 
     Args:
         objects: Whose positions and headings are looked at.
@@ -101,7 +101,7 @@ def check_directions(objects: Iterable[ScenarioObject], requirements: Iterable[R
             if given is None or needed is None:
                 continue
             placed = given.explicit and given.span is not None
-            hints = ("`facing Range(0, 360) deg` asks nothing of the map",) if name == "heading" else ()
+            hints = ("`facing Range(0, 360) deg` needs nothing from the map",) if name == "heading" else ()
             raise fail(
                 "map-lacks", _NO_LANE.format(_named(needed)), given.span if placed else owner.span,
                 "needs lanes" if placed else f"the default {name} of `{owner.category}` needs lanes", hints,
@@ -111,7 +111,7 @@ def check_directions(objects: Iterable[ScenarioObject], requirements: Iterable[R
         needed = _needed_direction(requirement.condition) if requirement.built_in is None else None
         if needed is not None:
             raise fail("map-lacks", _NO_LANE.format(_named(needed)), needed.span or requirement.span, "needs lanes",
-                       ("leave out what the program asks of it",))  # fmt: skip
+                       ("leave out what needs it",))  # fmt: skip
 
 
 def check_enforced(scenario: Scenario, enforced: Collection[BuiltIn]) -> None:
@@ -132,19 +132,19 @@ def check_enforced(scenario: Scenario, enforced: Collection[BuiltIn]) -> None:
         if names is not None:
             owner = scenario.objects[requirement.objects[0]]
             raise fail(
-                "map-lacks", f"the map `{scenario.map}` has nothing for {listed(names)}", owner.span,
+                "map-lacks", f"the map `{scenario.map}` has nothing for {list_names(names)}", owner.span,
                 f"`--enforce {kind.value}` wants `{owner.name}` inside",
-                ("without it nothing is asked of the map",),
+                ("without it the map is not needed",),
                 (Note(requirement.span, "the default"),) if requirement.span not in (None, owner.span) else (),
             )  # fmt: skip
 
 
-def listed(names: Iterable[str]) -> str:
+def list_names(names: Iterable[str]) -> str:
     """Names of parts of a map, as messages give them."""
     return " and ".join(f"`{name}`" for name in names) or "this"
 
 
-_NO_LANE = "the map has no lane that `{}` could be the direction of"
+_NO_LANE = "the map has no lane whose direction `{}` could be"
 
 
 def _fields(node: DirectionAt) -> list[Value]:

@@ -15,7 +15,7 @@ from scenicq.errors import ScenarioError, Span
 from scenicq.forest.nodes import Constant
 from scenicq.limits import LIMITS
 
-__all__ = ["check_weight", "hashed", "is_flat", "is_random", "no_number", "plain_binary", "plain_unary"]
+__all__ = ["check_hashable", "check_weight", "is_flat", "is_random", "number_error", "plain_binary", "plain_unary"]
 
 
 _PYTHON: dict[str, Callable[[Any, Any], Any]] = {
@@ -93,7 +93,7 @@ def check_weight(span: Span, *values: ModelValue, compared: bool = False) -> Non
                    (f"keep lists below {LIMITS.value_items:,} items and {LIMITS.value_nesting} levels",))  # fmt: skip
 
 
-def no_number(error: ArithmeticError, span: Span | None, label: str) -> ScenarioError:
+def number_error(error: ArithmeticError, span: Span | None, label: str) -> ScenarioError:
     """A runtime-error where arithmetic on known numbers has no result, or one that no float holds."""
     return fail("runtime-error", f"a number is too large, or not one: {error}", span, label)
 
@@ -152,7 +152,7 @@ def plain_unary(op: str, value: ModelValue, span: Span) -> ModelValue:
         raise fail("wrong-type", f"`{op}` does not apply to {describe(value)}", span) from None
 
 
-def hashed(value: ModelValue, span: Span) -> ModelValue:
+def check_hashable(value: ModelValue, span: Span) -> ModelValue:
     """A value that is to be a key or the member of a set.
 
     Raises:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, cast
 
-from scenicq.compiler.arithmetic import hashed
+from scenicq.compiler.arithmetic import check_hashable
 from scenicq.compiler.coerce import to_boolean
 from scenicq.compiler.environment import Environment
 from scenicq.compiler.items import items_of
@@ -36,7 +36,7 @@ def assign(run: Interpreter, target: ast.Expression, value: ModelValue, scope: E
                 raise fail("wrong-type", f"an item of {describe(holder)} cannot be set", target.span)
             place = run.evaluate(index, scope)
             try:
-                cast(Any, holder)[hashed(place, target.span) if isinstance(holder, dict) else place] = value
+                cast(Any, holder)[check_hashable(place, target.span) if isinstance(holder, dict) else place] = value
             except (IndexError, TypeError):
                 raise fail("runtime-error", "there is no item with this index", target.span) from None
         case ast.Subscript() | ast.SubscriptSlice() | ast.Starred():

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, cast
 
 from scenicq.compiler import operators
-from scenicq.compiler.arithmetic import check_weight, hashed, is_flat, is_random
+from scenicq.compiler.arithmetic import check_hashable, check_weight, is_flat, is_random
 from scenicq.compiler.coerce import property_node, to_heading, to_region, to_scalar, to_vector
 from scenicq.compiler.coroutines import NotBegun, ScenarioCall
 from scenicq.compiler.elements import MISSING, is_of_elements, names_of, of_element, of_network
@@ -86,8 +86,8 @@ def attribute(run: Interpreter, value: ModelValue, name: str, span: Span) -> Mod
         return _of_choice(run, options, name, span)
     if found is MISSING:
         if value is None and is_of_elements(name):
-            raise fail("map-lacks", f"the map has no element here that `{name}` could be of", span, "this is of None",
-                       ("leave out with a condition where there is none",))  # fmt: skip
+            raise fail("map-lacks", f"the map has no element here, so there is no `{name}`", span, "this is of None",
+                       ("exclude places where there is none by a condition",))  # fmt: skip
         raise unknown_attribute(value, name, _names(run, value), _PLACES.get(name.lstrip("_"), ""), span)
     return found
 
@@ -160,7 +160,7 @@ def _guarded(name: str, owner: ModelValue) -> Callable[..., ModelValue]:
             held = cast("list[ModelValue]", [*args[0]])
             _check_length(sum(len(owner) + len(each) for each in held if isinstance(each, str)), span)
         if isinstance(owner, dict | set) and name in _KEYED:
-            args = (hashed(args[0], span), *args[1:]) if args else args
+            args = (check_hashable(args[0], span), *args[1:]) if args else args
         if isinstance(owner, str) and name == "replace" and all(isinstance(arg, str) for arg in args[:2]):
             old, new = (*args, "", "")[:2]
             grown = owner.count(old) * max(len(new) - len(old), 0)

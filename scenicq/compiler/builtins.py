@@ -10,14 +10,14 @@ from collections.abc import Callable
 from typing import Any, cast
 
 from scenicq.compiler import operators
-from scenicq.compiler.arithmetic import hashed, is_random
+from scenicq.compiler.arithmetic import check_hashable, is_random
 from scenicq.compiler.coerce import kind_of_model, to_scalar, to_vector
 from scenicq.compiler.comparisons import binary
 from scenicq.compiler.courses import as_test
 from scenicq.compiler.distributions import DISTRIBUTIONS
 from scenicq.compiler.random_values import is_choice
 from scenicq.compiler.region_functions import REGION_FUNCTIONS
-from scenicq.compiler.rounding import rounded, truncated
+from scenicq.compiler.rounding import round_number, truncate_number
 from scenicq.compiler.values import Builtin, Choice, Delayed, Instance, ModelValue, ScenicClass, describe, fail, is_node
 from scenicq.errors import Span
 from scenicq.forest import build
@@ -30,7 +30,7 @@ __all__ = ["extreme", "language_names", "mathematics", "truth"]
 
 def _sequence(value: ModelValue, span: Span) -> list[ModelValue]:
     if is_random(value):
-        raise fail("random-branch", "a random list cannot be gone through", span, "random here",
+        raise fail("random-branch", "a program cannot loop over a random list", span, "random here",
                    ("use `Uniform(*list)` to pick one of its items",))  # fmt: skip
     if isinstance(value, list | tuple | set | range | dict | str):
         return list(cast("list[ModelValue]", value))
@@ -147,7 +147,7 @@ def _of_random(name: str, span: Span, value: ModelValue, digits: ModelValue = No
     number = to_scalar(value, span)
     if name == "float":
         return number
-    return truncated(number, span) if name == "int" else rounded(number, digits or 0, span)
+    return truncate_number(number, span) if name == "int" else round_number(number, digits or 0, span)
 
 
 def _plain(name: str, function: Callable[..., Any]) -> Builtin:
@@ -195,7 +195,7 @@ def _rounded(value: float, digits: int | None = None) -> float:
 
 
 def _set(span: Span, values: ModelValue = ()) -> ModelValue:
-    return {hashed(value, span) for value in _sequence(values, span)}
+    return {check_hashable(value, span) for value in _sequence(values, span)}
 
 
 def _dict(span: Span, pairs: ModelValue = (), **named: ModelValue) -> ModelValue:
@@ -204,7 +204,7 @@ def _dict(span: Span, pairs: ModelValue = (), **named: ModelValue) -> ModelValue
     found = [_sequence(pair, span) for pair in _sequence(pairs, span)]
     if any(len(pair) != 2 for pair in found):
         raise fail("wrong-value", "`dict` needs pairs", span)
-    return {**{hashed(key, span): value for key, value in found}, **named}
+    return {**{check_hashable(key, span): value for key, value in found}, **named}
 
 
 def _truth_value(span: Span, value: ModelValue = False) -> ModelValue:
@@ -235,7 +235,7 @@ def _length(values: Any) -> int:
 
 def _whole_numbers(span: Span, *args: ModelValue) -> ModelValue:
     if any(is_random(arg) for arg in args):
-        raise fail("random-branch", "how often a loop runs must be known", span, "random here",
+        raise fail("random-branch", "a loop must run a known number of times", span, "random here",
                    ("write one program per number of objects",))  # fmt: skip
     if any(not isinstance(arg, int) for arg in args):
         raise fail("wrong-type", "`range` needs whole numbers", span)

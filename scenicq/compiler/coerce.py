@@ -120,7 +120,7 @@ def _need(value: ModelValue, what: str, span: Span | None) -> Exception:
     shown = describe(value)
     hints: tuple[str, ...] = ()
     if isinstance(value, tuple) and len(cast("tuple[ModelValue, ...]", value)) == 2 and "number" in what:
-        hints = ("`Range(a, b)` is a random number of an interval; only Scenic 1 spells it `(a, b)`: `--scenic 1`",)
+        hints = ("`Range(a, b)` is a random number from an interval; only Scenic 1 writes it `(a, b)` (`--scenic 1`)",)
     elif "number" in what and span is not None and (vector := _VELOCITY.search(span.text)):
         hints = (f"`{vector[1]}.speed` is a number",)
     elif what == "a condition" and span is not None and (hint := condition_hint(span.text.split(None, 1)[0])):

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import cast
 
 from scenicq.compiler import operators
-from scenicq.compiler.arithmetic import check_weight, hashed, is_flat, is_random, plain_binary
+from scenicq.compiler.arithmetic import check_hashable, check_weight, is_flat, is_random, plain_binary
 from scenicq.compiler.coerce import kind_of_model
 from scenicq.compiler.other_objects import is_element, is_nearest, same_object
 from scenicq.compiler.random_values import holds_instances, is_choice, lift, possible_values
@@ -148,7 +148,7 @@ def _compare_values(op: str, left: ModelValue, right: ModelValue, span: Span) ->
         if isinstance(left, Instance) and isinstance(right, Instance) and (said := _at_a_side(span)):
             raise fail(
                 "wrong-type",
-                f"`{op}` asks whether two names are of one object",
+                f"`{op}` asks whether two names mean one object",
                 span,
                 f"this is {describe(right)}",
                 said,
@@ -194,7 +194,7 @@ def _membership(op: str, left: ModelValue, right: ModelValue, span: Span) -> Mod
         if _is_special(left) or (not is_flat(items) and any(map(_is_special, items))):
             return negated(_any_equal(left, items, span))
         check_weight(span, left, right, compared=True)
-        return (hashed(left, span) in right if isinstance(right, dict | set) else left in items) == (op == "in")
+        return (check_hashable(left, span) in right if isinstance(right, dict | set) else left in items) == (op == "in")
     raise fail("wrong-type", f"`{op}` needs a region or a list", span, f"this is {describe(right)}",
                _at_a_side(span))  # fmt: skip
 
@@ -243,10 +243,10 @@ def iterate(value: ModelValue, span: Span) -> list[ModelValue]:
         plain = all(isinstance(item, str | int | float) for item in items)
         return sorted(items, key=lambda item: (isinstance(item, str), item)) if plain else items
     if is_random(value):
-        raise fail("random-branch", "a random list cannot be gone through", span, "random here",
+        raise fail("random-branch", "a program cannot loop over a random list", span, "random here",
                    ("use `Uniform(*list)` to pick one of its items",))  # fmt: skip
     if isinstance(value, LabelObjects | OtherList):
         hint = "ask with `any(... for c in others(C))`, `all(...)`, `len([...])`, or `count(C)`"
-        what = "the other label objects cannot be gone through one by one"
+        what = "a program cannot loop over the other label objects"
         raise fail("unsupported-construct", what, span, "not a list", (hint,))
-    raise fail("wrong-type", f"{describe(value)} cannot be gone through", span, "not a list")
+    raise fail("wrong-type", f"a program cannot loop over {describe(value)}", span, "not a list")

@@ -148,7 +148,7 @@ class ComposedScenario:
 
     @property
     def arrives(self) -> Node:
-        """That a sample shows what it makes, as a condition that no label says."""
+        """The condition that a sample shows the objects which the scenario makes; no label says it."""
         index = cast(int, self.objects[0].index)
         return Feature(index, f"{ARRIVES}{self.number}", "boolean", current=True, span=self.span)
 
@@ -210,7 +210,7 @@ class CompositionGraph(ProcessGraph):
             ScenarioError: See `process_of`.
         """
         definition = cast(ScenarioDefinition, self.top.of)
-        frames: tuple[ProcessFrame, ...] = (CallFrame(self.top, self.held(names)), self._body(definition))
+        frames: tuple[ProcessFrame, ...] = (CallFrame(self.top, self.hold_names(names)), self._body(definition))
         guards = definition.guards("precondition") + definition.guards("invariant")
         start = ProcessState(frames)
         if guards:
@@ -276,9 +276,9 @@ class CompositionGraph(ProcessGraph):
         base = super().ask
         return self._as_seen(state, lambda: base(state, wanted, then, otherwise, number))
 
-    def evaluated(self, state: ProcessState, node: ast.Expression) -> tuple[ModelValue, GraphGuards]:
+    def evaluate(self, state: ProcessState, node: ast.Expression) -> tuple[ModelValue, GraphGuards]:
         """The value of an expression, over the names and the ego of a scenario."""
-        base = super().evaluated
+        base = super().evaluate
         with self._drawn_by_scene(state):
             return self._as_seen(state, lambda: base(state, node))
 
@@ -318,7 +318,7 @@ class CompositionGraph(ProcessGraph):
         if node.schedule:
             return super().do(state, node, rest)
         inner: GraphStatement = EnterScenarios(node.behaviors, node.span)
-        return self.limited(state, rest, (inner,), node.until, node.duration, node.unit)
+        return self.run_limited(state, rest, (inner,), node.until, node.duration, node.unit)
 
     def as_done(self, value: ModelValue, span: Span) -> ModelValue:
         """What is done, as a call."""
@@ -328,12 +328,12 @@ class CompositionGraph(ProcessGraph):
 
     def begin(self, state: ProcessState, value: ModelValue, rest: ProcessState, span: Span) -> Following:
         """Begin what was chosen."""
-        return self.pushed(rest, BlockFrame((EnterScenarios((self.values.hold(value),), span),)))
+        return self.push(rest, BlockFrame((EnterScenarios((self.values.hold(value),), span),)))
 
     def _enter(self, state: ProcessState, node: EnterScenarios, rest: ProcessState) -> Following:
         """Begin one scenario after the other, then run all of them."""
         if not node.waiting:
-            return self.pushed(rest, TogetherFrame(node.begun, node.span))
+            return self.push(rest, TogetherFrame(node.begun, node.span))
         first, *others = node.waiting
         if not node.begun:
             # those that the scenario runs are others now
@@ -342,9 +342,9 @@ class CompositionGraph(ProcessGraph):
         if isinstance(first, Held):
             value = first.value
         else:
-            value, guards = self.evaluated(state, first)
+            value, guards = self.evaluate(state, first)
         if isinstance(value, DelayedCall):
-            value, guards = self.evaluated(state, value.call)
+            value, guards = self.evaluate(state, value.call)
         after = replace(node, waiting=tuple(others))
         is_named = isinstance(first, Held) or not isinstance(first, ast.Call)
         found = self._entered(state, self.as_done(value, node.span), after, rest, is_named=is_named)
@@ -357,14 +357,14 @@ class CompositionGraph(ProcessGraph):
         if isinstance(value, Choice):
             held = [self.values.hold(self.as_done(each, after.span)) for each in value.options]
             ways = [replace(after, waiting=(each, *after.waiting)) for each in held]
-            return Ways(tuple(self.pushed(rest, BlockFrame((each,))) for each in ways))
+            return Ways(tuple(self.push(rest, BlockFrame((each,))) for each in ways))
         if not isinstance(value, ScenarioCall):
             raise fail("wrong-type", "this is no scenario", after.span, f"this is {describe(value)}")
         depth = sum(isinstance(each, TogetherFrame) for each in state.frames)
         if depth > LIMITS.call_nesting:
             raise fail("budget-exceeded", f"scenarios are nested deeper than {LIMITS.call_nesting}", after.span,
                        "this one", ("replace the recursion by a loop",))  # fmt: skip
-        within = self.called(state, value)
+        within = self.push_call(state, value)
         found = self._begun(state, value, after, rest, is_named=is_named)
         guards = value.of.guards("precondition") + value.of.guards("invariant")
         for guard in reversed(guards):
@@ -390,10 +390,10 @@ class CompositionGraph(ProcessGraph):
         frames: tuple[ProcessFrame, ...] | None = None
         if definition.compose is not None or definition.guards("invariant"):
             names = {name: scenario.names[name] for name in scenario.made.scope.names}
-            call = CallFrame(value, self.held(names))
+            call = CallFrame(value, self.hold_names(names))
             frames = call, self._body(definition)
         running = RunningScenario(scenario.number, timer, frames)
-        found: Following = self.pushed(timed, BlockFrame((replace(after, begun=(*after.begun, running)),)))
+        found: Following = self.push(timed, BlockFrame((replace(after, begun=(*after.begun, running)),)))
         if scenario.after_s is not None:
             found = TimerStarts(timer, scenario.after_s, found)
         for index, process in reversed(scenario.overrides):
@@ -525,7 +525,7 @@ class CompositionGraph(ProcessGraph):
     def _unknown_now(self, state: ProcessState, node: Node, scenario: ComposedScenario, name: str) -> Node:
         """A condition of which nothing is known that was read, or drawn, where its scenario has begun."""
         found = cast(Node, self._forgotten(node, scenario, name))
-        for leaf in self.values.drawn(found):
+        for leaf in self.values.drawn_variables(found):
             if isinstance(leaf, Index):
                 raise fail("unsupported-construct", "a choice of a scenario that begins within a run is not supported",
                            leaf.span or scenario.span, "drawn when it begins",
@@ -569,7 +569,7 @@ class CompositionGraph(ProcessGraph):
             return below
 
         def on(**changes: object) -> ProcessState:
-            return self.pushed(below, replace(frame, **changes))  # type: ignore[arg-type]
+            return self.push(below, replace(frame, **changes))  # type: ignore[arg-type]
 
         if frame.at == len(frame.scenarios):
             if frame.stage == "runs":
@@ -637,15 +637,15 @@ class CompositionGraph(ProcessGraph):
         except NotBegun:
             return replace(state, asked=state.asked + 1)
 
-    def checked(self, state: ProcessState, number: int | None = None) -> ProcessState:
+    def ask_invariants(self, state: ProcessState, number: int | None = None) -> ProcessState:
         """A state in which the invariants of a scenario are asked first, unless it waits for others that it runs."""
         waits = bool(state.frames) and isinstance(state.frames[-1], TogetherFrame)
-        return state if number is None and waits and state.resumed < 0 else super().checked(state, number)
+        return state if number is None and waits and state.resumed < 0 else super().ask_invariants(state, number)
 
-    def switched(self, state: ProcessState, at: int, block: int) -> Following:
+    def switch_block(self, state: ProcessState, at: int, block: int) -> Following:
         """A state in which a block of a `try` runs; whatever a `do` ends, its scenarios end with it."""
         frame = cast(TryFrame, state.frames[at])
-        found = super().switched(state, at, block)
+        found = super().switch_block(state, at, block)
         if not (frame.ends and block < len(frame.handlers) and block != frame.running):
             return found
         inner = next((each for each in state.frames[at + 1 :] if isinstance(each, TogetherFrame)), None)
@@ -674,17 +674,17 @@ class CompositionGraph(ProcessGraph):
         first = _inside(state.frames) + 1
         return replace(state, frames=(*state.frames[:first], *_lost(state.frames[first:])))
 
-    def aged(self, frames: tuple[ProcessFrame, ...], place: str, *, first: bool) -> tuple[ProcessFrame, ...]:
+    def age_frames(self, frames: tuple[ProcessFrame, ...], place: str, *, first: bool) -> tuple[ProcessFrame, ...]:
         """Frames at the next sample."""
         found: list[ProcessFrame] = []
-        for number, frame in enumerate(super().aged(frames, place, first=first)):
+        for number, frame in enumerate(super().age_frames(frames, place, first=first)):
             if not isinstance(frame, TogetherFrame):
                 found.append(frame)
                 continue
             scenarios: list[RunningScenario] = []
             for count, each in enumerate(frame.scenarios):
                 here = f"{place}{number}.{count}."
-                inner = None if each.frames is None else self.aged(each.frames, here, first=first)
+                inner = None if each.frames is None else self.age_frames(each.frames, here, first=first)
                 scenarios.append(replace(each, frames=inner))
             found.append(replace(frame, scenarios=tuple(scenarios)))
         return tuple(found)

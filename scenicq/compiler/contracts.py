@@ -8,8 +8,8 @@ How a contract is checked. A *mode* is entered at a sample. From `--reaction` an
 mode is out of its contract at a sample if `shows` is false at every sample of the last `settles_s` seconds:
 accelerations are slopes over a second, and boxes jump, so that only what no sample of a second shows is not shown. And
 what the program's own conditions switch to, which slopes show before it comes, breaks nothing. `shows_from` is the same
-for what hangs on the place where the mode was entered. A behavior that goes through several phases gives a contract for
-each: modes of their own, one after the other.
+for what depends on the place where the mode was entered. A behavior that goes through several phases gives a contract
+for each: modes of their own, one after the other.
 
 What is weaker than what behaviors do: the order of the lanes of a trajectory is seen by the direction of travel alone;
 a change of lanes need not begin, only end; that a heading is *held* is seen by motion along the object's own heading;
@@ -71,7 +71,7 @@ class Contract:
         remains: Whether what it shows goes on after it is over, until the object does something else, as who is sent
             walks on.
         shows_from: Gives what must be shown besides by who entered the mode at a place, an expression: where it was as
-            observed, or a feature that is not observed; None where nothing hangs on it.
+            observed, or a feature that is not observed; None where nothing depends on it.
     """
 
     name: str
@@ -335,7 +335,7 @@ class _Motion:
         return self.within(self.course(lane, name, against=against), _bound("lane"))
 
     def course(self, lane: ModelValue, name: str, *, against: bool = False) -> Node:
-        """Where one comes to who keeps to a lane.
+        """Where a driver comes to who keeps to a lane.
 
         Raises:
             ScenarioError: wrong-type: that is no lane.
@@ -347,13 +347,13 @@ class _Motion:
                 raise self.wrong(option, f"`{name}` is a lane of the map")
             return lane_course(self.run, option, self.span, against=against)
 
-        return self.each(lane, area)
+        return self.map_outcomes(lane, area)
 
-    def each(self, value: ModelValue, make: Callable[[ModelValue], Region]) -> Node:
+    def map_outcomes(self, value: ModelValue, make: Callable[[ModelValue], Region]) -> Node:
         """What is made of a value, or of each outcome of a choice; where there is no element, there is no region."""
         if isinstance(value, Choice):
             nothing = build.constant(Undefined("there is no such element here"), self.span)
-            options = (nothing if each is None else self.each(each, make) for each in value.options)
+            options = (nothing if each is None else self.map_outcomes(each, make) for each in value.options)
             return Select(value.index, tuple(options), span=self.span)
         return build.constant(make(value), self.span)
 
@@ -376,7 +376,7 @@ class _Motion:
             lane = option.lane if isinstance(option, LaneSection) else option
             return lanes_and_junctions((lane,), lane.name)
 
-        parts = tuple(self.each(each, area) for each in lanes)
+        parts = tuple(self.map_outcomes(each, area) for each in lanes)
         return parts[0] if len(parts) == 1 else fold(RegionUnion(parts, span=self.span))
 
     def behind(self, lane: ModelValue, name: str) -> Node:
@@ -393,7 +393,7 @@ class _Motion:
             x, y = option.centerline.lines[-1].coords[-1][:2]
             return PointSet(((x, y),), f"the end of {option.name}")
 
-        return self.each(lane, target)
+        return self.map_outcomes(lane, target)
 
 
 # --- actions
@@ -584,7 +584,7 @@ def _follow_lane(
 
 
 def _keeps_lane(motion: _Motion, *, against: bool = False) -> Callable[[Node], Node]:
-    """The centre is where one of the lanes entered on leads to; who entered on none may be anywhere."""
+    """The centre is where a lane leads to that the object entered on; if it entered on none, it may be anywhere."""
     lookups, network = motion.run.lookups, motion.run.network
     table = lookups.table((id(network), "laneAt"), lambda: LookupTable.of_network(network, "laneAt"))
     lanes = (cast(Lane, each) for each in table.options)
@@ -664,7 +664,7 @@ def _change_lane(
         motion.within(motion.run.network.drivableRegion, _bound("lane")),
         motion.approaches(motion.number(target_speed, "target_speed")),
     )
-    middle = motion.within(motion.each(laneSectionToSwitch, line), _bound("arrived"))
+    middle = motion.within(motion.map_outcomes(laneSectionToSwitch, line), _bound("arrived"))
     return Contract(
         motion.name, shows, settles_s=_bound("lane window"), over=middle,
         shows_from=lambda place: _either(new, from_old(place)),

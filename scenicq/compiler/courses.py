@@ -1,4 +1,4 @@
-"""Conditions whose course hangs on the scene: `if`, filters, `sorted` and their like in `require`, monitors and ends.
+"""Conditions whose course depends on the scene: `if`, filters, `sorted` and their like in `require`, monitors and ends.
 
 Scenic evaluates such a condition on the drawn scene, on which everything is known. Here a label takes the scene's place
 later on. So the condition is evaluated once for each course that it may take, and becomes a choice between their
@@ -25,7 +25,7 @@ from scenicq.limits import LIMITS
 if TYPE_CHECKING:
     from scenicq.compiler.interpreter import Interpreter
 
-__all__ = ["Course", "as_test", "option_of", "split", "without_courses"]
+__all__ = ["Course", "as_test", "forbid_courses", "option_of", "split_by_course"]
 
 
 class Course:
@@ -39,7 +39,7 @@ class Course:
         Raises:
             ScenarioError: random-branch, where the condition may take one course alone.
         """
-        raise _refused(span, "how often a loop runs must be known")
+        raise _refused(span, "a loop must run a known number of times")
 
 
 @dataclass(eq=False, slots=True)
@@ -66,7 +66,7 @@ class _Taken(Course):
         if number < len(self.given):
             before, outcome = self.given[number]
             if [leaf.identity for leaf in leaves(test)] != [leaf.identity for leaf in leaves(before)]:
-                raise _refused(span, "what is drawn here is drawn anew in each course")
+                raise _refused(span, "each course of the condition draws this again")
             test = before
         self.tests.append(test)
         self.outcomes.append(outcome)
@@ -88,12 +88,12 @@ def _on(run: Interpreter, course: Course) -> Generator[None]:
         run.course = before
 
 
-def without_courses(run: Interpreter) -> AbstractContextManager[None]:
+def forbid_courses(run: Interpreter) -> AbstractContextManager[None]:
     """While what is evaluated must have one course, although objects are read as a label shows them."""
     return _on(run, Course())
 
 
-def split(run: Interpreter, evaluate: Callable[[], Node], span: Span) -> Node:
+def split_by_course(run: Interpreter, evaluate: Callable[[], Node], span: Span) -> Node:
     """The value of a condition as a choice between those of its courses.
 
     Args:

@@ -12,7 +12,7 @@ from scenicq.compiler.known_properties import as_constant
 from scenicq.compiler.lanes_ahead import lanes_ahead
 from scenicq.compiler.lookups import among, look_up, look_up_ways
 from scenicq.compiler.random_values import is_choice, lift
-from scenicq.compiler.road_attributes import worked_out
+from scenicq.compiler.road_attributes import computed_attribute
 from scenicq.compiler.values import Builtin, ModelValue, describe, fail
 from scenicq.errors import Span
 from scenicq.forest import build
@@ -70,7 +70,7 @@ def method_of(run: Interpreter, value: NetworkElement, name: str) -> Builtin | N
     if name == "crossingAt" and isinstance(value, Road):
 
         def crossing(span: Span, point: ModelValue, reject: ModelValue = None) -> ModelValue:
-            found = worked_out(run, value, "crossings", span)
+            found = computed_attribute(run, value, "crossings", span)
             assert found is not None
             return among(run, found[0], f"crossingAt of {value.id}", point, reject, span)
 
@@ -121,7 +121,7 @@ def nominal_directions(run: Interpreter, owner: Network | NetworkElement) -> Bui
 
 
 def _directions(element: ModelValue, place: Node, span: Span) -> ModelValue:
-    """Those of one element; at a random place of an intersection one, which may be that of any way there."""
+    """The directions of traffic of one element; at a random place of an intersection, the one of any way there."""
     field = element.orientation if isinstance(element, NetworkElement) else None
     if field is None:
         return ()

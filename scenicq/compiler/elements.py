@@ -14,7 +14,7 @@ import shapely
 from scenicq.compiler.element_lookups import LOOKUPS
 from scenicq.compiler.element_methods import METHODS, find_among, method_of, nominal_directions
 from scenicq.compiler.lookups import look_up
-from scenicq.compiler.road_attributes import is_worked_out, names_worked_out, worked_out
+from scenicq.compiler.road_attributes import computed_attribute, computed_names, is_computed
 from scenicq.compiler.values import Builtin, ModelValue, Module, fail
 from scenicq.errors import Span
 from scenicq.forest import build
@@ -81,13 +81,13 @@ def names_of(value: Network | NetworkElement | Maneuver | Signal) -> set[str]:
     """The attributes that a value may have."""
     if isinstance(value, Network):
         own = _NETWORK | LOOKUPS.keys() | METHODS | value.otherRegions.keys()
-        return {"findPointIn", *own, *names_worked_out(value)}
+        return {"findPointIn", *own, *computed_names(value)}
     own = _own_names(type(value))
     if isinstance(value, Signal):
         return set(own)
     if isinstance(value, Maneuver):
         return {*own, *_MANEUVER}
-    return set(own) | names_worked_out(value) | (METHODS if value.orientation is not None else set())
+    return set(own) | computed_names(value) | (METHODS if value.orientation is not None else set())
 
 
 @cache
@@ -99,7 +99,7 @@ def _own_names(kind: type) -> frozenset[str]:
 def is_of_elements(name: str) -> bool:
     """Whether elements of some kind have an attribute; those without one of their own only have what others have."""
     own = any(name in names for kind, names in _ATTRIBUTES.items() if issubclass(kind, NetworkElement))
-    return own or name in METHODS or is_worked_out(name)
+    return own or name in METHODS or is_computed(name)
 
 
 def of_network(run: Interpreter, network: Network, name: str, span: Span) -> ModelValue:
@@ -118,7 +118,7 @@ def of_network(run: Interpreter, network: Network, name: str, span: Span) -> Mod
             return find_among(run, point, elems, reject, span)
 
         return Builtin(name, find_in)
-    worked = worked_out(run, network, name, span)
+    worked = computed_attribute(run, network, name, span)
     if worked is not None:
         return worked[0]
     if name in network.otherRegions:
@@ -141,7 +141,7 @@ def of_element(run: Interpreter, value: NetworkElement | Maneuver | Signal, name
     if isinstance(value, Maneuver) and name in _MANEUVER:
         return _of_maneuver(value, name)
     if isinstance(value, NetworkElement):
-        worked = worked_out(run, value, name, span)
+        worked = computed_attribute(run, value, name, span)
         if worked is not None:
             return worked[0]
         method = method_of(run, value, name)
@@ -152,7 +152,7 @@ def of_element(run: Interpreter, value: NetworkElement | Maneuver | Signal, name
     try:
         found: Any = getattr(value, name)
     except MissingElementError as error:
-        hints = (f"`_{name}` is None there: leave such elements out with a condition",)
+        hints = (f"`_{name}` is None there: exclude such elements by a condition",)
         raise fail("map-lacks", f"the map says that {error}", span, "not in this map", hints) from None
     if found is None and name == "centerline":
         raise fail("map-lacks", f"the map gives no centreline for {value.name}", span, "not in this map")  # type: ignore[union-attr]

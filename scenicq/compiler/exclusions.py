@@ -16,7 +16,7 @@ from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.forest.nodes import Identity, Index, LogicOp, Node, Select
 
-__all__ = ["Exclusions", "with_exclusions"]
+__all__ = ["Exclusions", "collect_exclusions"]
 
 if TYPE_CHECKING:
     from scenicq.compiler.interpreter import Interpreter
@@ -93,7 +93,7 @@ class Exclusions:
         level.setdefault(key, _Choice(index, count, span)).excluded.update(options)
 
     @contextmanager
-    def apart(self) -> Generator[list[_Told]]:
+    def collect_separately(self) -> Generator[list[_Told]]:
         """What is excluded meanwhile is only listed."""
         before, found = self._apart, list[_Told]()
         self._apart = found
@@ -129,12 +129,12 @@ class Exclusions:
         return _key(index) in self._lacking
 
     def conditions(self) -> list[tuple[Node, Span]]:
-        """That the choices come out as something else, each with the place that needs it."""
+        """The conditions that choices come out as something else, each with the place in the program that needs it."""
         return [(_condition(choice), _with_owner(choice.span)) for choice in self._found.values()]
 
 
-def with_exclusions(run: Interpreter, work: Callable[[], _Result]) -> tuple[_Result, list[tuple[Node, Span]]]:
-    """What is worked out, with what it excludes: the scene as a whole excludes nothing of that."""
+def collect_exclusions(run: Interpreter, work: Callable[[], _Result]) -> tuple[_Result, list[tuple[Node, Span]]]:
+    """Work something out, and collect what it excludes, which the scene as a whole then does not exclude."""
     of_scene, run.excluded = run.excluded, Exclusions()
     try:
         return work(), run.excluded.conditions()
@@ -149,7 +149,7 @@ def _with_owner(span: Span) -> Span:
 
 
 def _condition(choice: _Choice) -> Node:
-    """That no excluded option comes out; choices hang on each other as deep as the program nests its own."""
+    """The condition that no excluded option comes out; choices nest as deep as those of the program."""
     yes, no = build.constant(True), build.constant(False)
 
     def option(number: int) -> Node:

@@ -10,7 +10,7 @@ from inspect import signature
 from typing import TYPE_CHECKING, assert_never, cast
 
 from scenicq.compiler import operators
-from scenicq.compiler.arithmetic import hashed, plain_unary
+from scenicq.compiler.arithmetic import check_hashable, plain_unary
 from scenicq.compiler.assignment import assign_around, go_through, through_others
 from scenicq.compiler.attributes import attribute
 from scenicq.compiler.comparisons import binary, compare, iterate, symbolic
@@ -24,7 +24,7 @@ from scenicq.compiler.logic import condition, connect, invert
 from scenicq.compiler.operations import phrase
 from scenicq.compiler.random_values import each_existing, is_choice, lift, nothing_to_choose
 from scenicq.compiler.texts import checked_text, format_string
-from scenicq.compiler.unread import read
+from scenicq.compiler.unread import read_value
 from scenicq.compiler.values import (
     Builtin,
     Choice,
@@ -232,7 +232,7 @@ def _evaluate(run: Interpreter, node: ast.Expression, scope: Environment) -> Mod
                 return Module("globalParameters", {name: given[0] for name, given in run.params.items()})
             if node.id == "simulation" and run.simulation is not None and scope.find(node.id) is None:
                 return run.simulation
-            return read(run, scope.get(node.id, span))
+            return read_value(run, scope.get(node.id, span))
         case ast.LiteralValue():
             if isinstance(node.value, complex | bytes | type(...)):
                 raise fail("unsupported-construct", "a literal of this kind is not supported", span)
@@ -258,7 +258,7 @@ def _evaluate(run: Interpreter, node: ast.Expression, scope: Environment) -> Mod
         case ast.List():
             return _items(run, node.items, scope)
         case ast.Set():
-            return {hashed(item, span) for item in _items(run, node.items, scope)}
+            return {check_hashable(item, span) for item in _items(run, node.items, scope)}
         case ast.Dict():
             return _dictionary(run, node, scope)
         case ast.Subscript():
@@ -277,12 +277,12 @@ def _evaluate(run: Interpreter, node: ast.Expression, scope: Environment) -> Mod
                 return through_others(run, node, first, scope)
             items: list[ModelValue] = []
             go_through(run, node.clauses, scope, lambda inner: items.append(evaluate(run, node.element, inner)), first)
-            return {hashed(item, span) for item in items} if node.kind == "set" else items
+            return {check_hashable(item, span) for item in items} if node.kind == "set" else items
         case ast.DictComprehension():
             table: dict[ModelValue, ModelValue] = {}
 
             def put(inner: Environment) -> None:
-                table[hashed(evaluate(run, node.key, inner), span)] = evaluate(run, node.value, inner)
+                table[check_hashable(evaluate(run, node.key, inner), span)] = evaluate(run, node.value, inner)
 
             go_through(run, node.clauses, scope, put)
             return table
@@ -306,7 +306,7 @@ def _attribute(run: Interpreter, value: ModelValue, node: ast.Attribute, scope: 
     if value is None and isinstance(node.value, ast.Attribute):
         owner, lacked = evaluate(run, node.value.value, scope), node.value.name
         if isinstance(owner, NetworkElement):
-            hints = (f"`{lacked}` is None there: leave such elements out with a condition",)
+            hints = (f"`{lacked}` is None there: exclude such elements by a condition",)
             raise fail("map-lacks", f"the map says that {owner.name} has no `{lacked}`", node.value.name_span,
                        "not in this map", hints)  # fmt: skip
     name = FIRST_NAMES.get(node.name, node.name) if run.version == 1 and isinstance(value, Instance) else node.name
@@ -330,5 +330,5 @@ def _dictionary(run: Interpreter, node: ast.Dict, scope: Environment) -> dict[Mo
                 raise fail("wrong-type", "`**` needs a dictionary", item.value.span, f"this is {describe(value)}")
             table.update(cast("dict[ModelValue, ModelValue]", value))
         else:
-            table[hashed(evaluate(run, item.key, scope), item.key.span)] = value
+            table[check_hashable(evaluate(run, item.key, scope), item.key.span)] = value
     return table

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, assert_never, cast
 
-from scenicq.compiler.arithmetic import no_number
+from scenicq.compiler.arithmetic import number_error
 from scenicq.compiler.assignment import assign
 from scenicq.compiler.classes import bind_arguments, define_class, refuse_decorators
 from scenicq.compiler.coerce import to_region, to_scalar
@@ -268,7 +268,7 @@ class Interpreter:
         return instance
 
     def _may_lack(self, index: Node) -> bool:
-        """Whether some option of a choice lacks a part that the program asks for, or of one that its index hangs on."""
+        """Whether an option of a choice, or of one that its index depends on, lacks a part that the program needs."""
         todo, seen = [index], set[tuple[int, str]]()
         while todo:
             for node in postorder([todo.pop()]):
@@ -309,7 +309,7 @@ class Interpreter:
             try:
                 self._execute(statement, scope)
             except ArithmeticError as error:
-                raise no_number(error, statement.span, "in this statement") from None
+                raise number_error(error, statement.span, "in this statement") from None
 
     def _execute(self, node: ast.Statement, scope: Environment) -> None:
         self.budget.step(node.span)
@@ -370,7 +370,7 @@ class Interpreter:
                 record_statement(self, node, scope)
             case ast.DynamicDefinition(kind="scenario"):
                 if lines := beside_blocks(node.body):
-                    raise fail("parse-error", "a scenario with blocks has nothing else", lines[0].span,
+                    raise fail("parse-error", "a scenario with blocks cannot have other statements", lines[0].span,
                                "beside the blocks", ("write it in the `setup` block",))  # fmt: skip
                 made = self.make_function(node.name, node.parameters, node.body, scope, node.span)
                 scope.set(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, cast
 
 from scenicq.compiler import operators
-from scenicq.compiler.arithmetic import hashed, is_random
+from scenicq.compiler.arithmetic import check_hashable, is_random
 from scenicq.compiler.coerce import kind_of_model, to_vector
 from scenicq.compiler.comparisons import compare, iterate
 from scenicq.compiler.courses import option_of
@@ -88,7 +88,7 @@ def subscript(run: Interpreter, value: ModelValue, index: ModelValue, span: Span
         return operators.direction_at(value, index, span)
     if isinstance(value, list | tuple | dict | str | range):
         if isinstance(value, dict):
-            hashed(index, span)
+            check_hashable(index, span)
         try:
             return cast(Any, value)[index]
         except (IndexError, KeyError, TypeError, ValueError):

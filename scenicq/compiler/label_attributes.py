@@ -1,7 +1,7 @@
 """Attributes that labels of a dataset have and a program does not give its objects: conditions read what labels say.
 
 Scenic itself has no such property, and refuses a program that reads it; one that says `with NAME VALUE` is for both.
-Only a dataset tells which attributes there are. Where a label lacks one, what hangs on it is unknown.
+Only a dataset tells which attributes there are. Where a label lacks one, what depends on it is unknown.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def label_attribute(run: Interpreter, value: Instance, name: str, span: Span) ->
     if types is None:
         return MISSING
     if run.course is None:
-        raise fail("unsupported-construct", f"`{name}` is what labels say, which conditions alone can read", span,
+        raise fail("unsupported-construct", f"labels give `{name}`, so only conditions can read it", span,
                    "not in a condition", ("read it in `require`, `terminate when`, a monitor, or `record` it",
                                           f"`with {name} VALUE` compares it"))  # fmt: skip
     # what is of several kinds is only ever compared for equality

@@ -1,4 +1,4 @@
-"""Where a driver who keeps to a lane may come to: the lane, and whatever it leads to.
+"""Where a driver may come to who keeps to a lane: the lane, and all that it leads to.
 
 At a junction Scenic's library goes straight on where the lane allows it, else any way that there is. Maps cut lanes as
 they like: where a lane ends outside of junctions, all that follow it count.
@@ -21,7 +21,7 @@ __all__ = ["dead_ends", "lane_course", "lanes_and_junctions", "lanes_from", "way
 
 
 def lane_course(run: Interpreter, lane: Lane, span: Span, *, against: bool = False) -> PolygonSet:
-    """The area of a lane and of all that one comes to who keeps to it, worked out when it is asked for.
+    """The area of a lane and of all lanes that it leads to, worked out when it is asked for.
 
     Args:
         run: The run of the program.
@@ -46,7 +46,7 @@ def lanes_and_junctions(lanes: Iterable[Lane], name: str) -> PolygonSet:
 
 
 def lanes_from(run: Interpreter, lane: Lane, span: Span, *, against: bool = False) -> tuple[Lane, ...]:
-    """The lane and all lanes that one comes to who keeps to it."""
+    """The lane and all lanes that it leads to."""
     found, waiting = {lane: None}, [lane]
     while waiting:
         now = waiting.pop()

@@ -111,17 +111,17 @@ class LocalValues:
                 self._keys.setdefault(id(value), (value, ("id", id(value))))
                 return "id", id(value)
 
-    def copied(self, value: ModelValue) -> ModelValue:
+    def copy_value(self, value: ModelValue) -> ModelValue:
         """A value whose lists and dictionaries may be changed."""
         match value:
             case list():
-                return [self.copied(each) for each in cast("list[ModelValue]", value)]
+                return [self.copy_value(each) for each in cast("list[ModelValue]", value)]
             case dict():
-                return {key: self.copied(each) for key, each in cast("dict[ModelValue, ModelValue]", value).items()}
+                return {key: self.copy_value(each) for key, each in cast("dict[ModelValue, ModelValue]", value).items()}
             case _:
                 return value
 
-    def aged(self, held: Held, place: str, *, first: bool) -> Held:
+    def age_value(self, held: Held, place: str, *, first: bool) -> Held:
         """A value at the next sample.
 
         Args:
@@ -193,7 +193,7 @@ class LocalValues:
 
         return self.hold(self._mapped(held.value, step))
 
-    def drawn(self, value: ModelValue) -> list[Leaf]:
+    def drawn_variables(self, value: ModelValue) -> list[Leaf]:
         """The random variables that a value was made of that are not those of the scene."""
         found = leaves(*self.nodes(value))
         ranks = self._current_ranks() if found else ()
@@ -203,10 +203,10 @@ class LocalValues:
         """Whether the process has drawn a random variable."""
         return identity.order > self.drawn_after and not any(identity.order in each for each in self.of_scene)
 
-    def each(self, value: ModelValue, leaf: Index) -> list[ModelValue]:
+    def outcomes_of(self, value: ModelValue, leaf: Index) -> list[ModelValue]:
         """A value for each way in which a choice that is drawn may come out."""
         count = 1 if leaf.identity in self._current_ranks() else len(leaf.weights)
-        return [self.settled(value, leaf, option) for option in range(count)]
+        return [self.settle_choice(value, leaf, option) for option in range(count)]
 
     def _current_ranks(self) -> set[Identity]:
         """The ranks at places that are read at each sample."""
@@ -224,7 +224,7 @@ class LocalValues:
 
         return self._mapped(value, step)
 
-    def settled(self, value: ModelValue, leaf: Index, option: int) -> ModelValue:
+    def settle_choice(self, value: ModelValue, leaf: Index, option: int) -> ModelValue:
         """A value where a choice comes out as an option."""
         given = {leaf.identity: float(option)}
 
@@ -274,7 +274,7 @@ class LocalValues:
                 return transform(cast(Node, each), step)
             if any(step(node) is not node for node in postorder(self.nodes(each))):
                 return NoValue(fail("unsupported-construct", "this cannot be read at a later sample", _place(each),
-                                    "says what was there", ("say it anew where it is read",)))  # fmt: skip
+                                    "says what was there", ("write it again where it is read",)))  # fmt: skip
             return each
 
         def inner(each: ModelValue) -> ModelValue:

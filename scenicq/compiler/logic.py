@@ -10,7 +10,7 @@ from scenicq.compiler import operators
 from scenicq.compiler.arithmetic import is_random
 from scenicq.compiler.builtins import truth
 from scenicq.compiler.coerce import kind_of_model, to_boolean
-from scenicq.compiler.courses import as_test, split
+from scenicq.compiler.courses import as_test, split_by_course
 from scenicq.compiler.environment import Environment
 from scenicq.compiler.known_properties import known_truth
 from scenicq.compiler.random_values import is_choice, lift
@@ -42,7 +42,7 @@ def condition(run: Interpreter, node: ast.Expression, scope: Environment) -> Mod
 
 def _operand(run: Interpreter, node: ast.Expression, scope: Environment) -> ModelValue:
     """The truth of an operand, with all its courses."""
-    found = split(run, lambda: to_boolean(condition(run, node, scope), node.span), node.span)
+    found = split_by_course(run, lambda: to_boolean(condition(run, node, scope), node.span), node.span)
     return found.value if isinstance(found, Constant) and isinstance(found.value, bool) else found
 
 

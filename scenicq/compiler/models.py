@@ -199,7 +199,7 @@ def unsupported_module(name: str, span: Span) -> ScenarioError | None:
     if name in _OF_PYTHON or name.partition(".")[0] not in sys.stdlib_module_names:
         return None
     return fail("unsupported-construct", f"Python's module `{name}` is not supported", span, "not imported",
-                ("of Python's modules only `math` is known: write what the scene needs in Scenic",))  # fmt: skip
+                ("`math` is the only Python module that is known: write the rest in Scenic",))  # fmt: skip
 
 
 _OF_PYTHON = frozenset({"math", "sys"})

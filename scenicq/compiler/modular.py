@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, cast
 from scenicq.compiler.coerce import read_over_time
 from scenicq.compiler.coroutines import CoroutineCall, ScenarioDefinition
 from scenicq.compiler.environment import Environment
-from scenicq.compiler.exclusions import with_exclusions
+from scenicq.compiler.exclusions import collect_exclusions
 from scenicq.compiler.scoping import own_names
 from scenicq.compiler.values import Instance, ModelValue, fail
 from scenicq.errors import Span, similar
@@ -128,10 +128,10 @@ def set_up(run: Interpreter, call: CoroutineCall, ego: Instance | None) -> SetUp
     assert run.timed is not None
     definition = cast(ScenarioDefinition, call.of)
     scope, first = _scope(call), len(run.objects)
-    timed = run.timed.apart()
+    timed = run.timed.for_inner_run()
     params, records = dict(run.params), list(run.records)
     with _within(run, timed, ego) as requirements, read_over_time(current=False):
-        _, excluded = with_exclusions(run, lambda: run.run(definition.setup, scope))
+        _, excluded = collect_exclusions(run, lambda: run.run(definition.setup, scope))
         ego = run.current_ego
     if definition.setup:
         run.is_initial = False

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from scenicq.compiler.absent import absent_parts, listed
+from scenicq.compiler.absent import absent_parts, list_names
 from scenicq.compiler.coerce import (
     apart_from_height,
     kind_of_model,
@@ -306,11 +306,11 @@ def existing(value: ModelValue, span: Span | None) -> Node:
     area = to_region(value, span)
     names = absent_parts(area)
     if names is not None:
-        raise fail("map-lacks", f"the map has nothing for {listed(names)}", span, "there is none", _ELSEWHERE)
+        raise fail("map-lacks", f"the map has nothing for {list_names(names)}", span, "there is none", _ELSEWHERE)
     return area
 
 
-_ELSEWHERE = ("the map of another dataset may have it", "leave out what the program asks of it")
+_ELSEWHERE = ("the map of another dataset may have it", "leave out what needs it")
 
 
 def within(item: ModelValue, region: ModelValue, span: Span) -> Node:

@@ -125,7 +125,7 @@ def _opened(region: Node) -> Node:
 
 
 def _of_union(parts: Sequence[Node], point: Node, span: Span | None) -> Node | None:
-    """That of the first part with a direction that holds the point, and of the nearest where numbers are rounded."""
+    """The direction of the first part that has one and holds the point, or of the nearest where rounding decides."""
     headings = [(part, heading) for part in parts if (heading := orientation(part, point, span)) is not None]
     if not headings:
         return None
@@ -156,7 +156,7 @@ def _any_heading(span: Span | None) -> Node:
 
 
 def _chosen_orientation(region: Select, point: Node, span: Span | None) -> Node | None:
-    """That of a region chosen at random; an option that is no region has none either, and does not count."""
+    """The direction of a region chosen at random; an option that is no region has none, and does not count."""
     found: list[Node | None] = []
     for option in region.options:
         if isinstance(option, Constant) and isinstance(option.value, Undefined):

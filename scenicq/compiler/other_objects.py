@@ -1,7 +1,7 @@
 """`others`, `count` and `nearest` of the module `scenicq.labels`: label objects that need not play a role.
 
-What is asked of one of them is evaluated once, of an element that stands for each (`forest/among`), and closed where
-`any`, `all` or `len` ends its list.
+A condition on each of them is evaluated once, over an *element*: an object that stands for any of them. The result
+becomes an `Among` node (`forest/among`) where `any`, `all`, `len` or a function here says what is asked of all.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "count",
-    "how_many",
+    "count_others",
     "is_element",
     "is_nearest",
     "list_elements",
@@ -64,39 +64,39 @@ _numbers = itertools.count(_FIRST_ELEMENT, -1)
 
 
 def _element(objects: LabelObjects, span: Span) -> Instance:
-    """What stands for each of some label objects."""
+    """Make the element of some label objects."""
     made = Instance(objects.cls, next(_numbers), span)
     made.properties.update(dict.fromkeys(OBSERVABLE))
     return made
 
 
 def others(run: Interpreter, span: Span, *args: ModelValue, **named: ModelValue) -> ModelValue:
-    """`others(C)`."""
+    """`others(C)`: the label objects of a class that play no role."""
     cls = _class(run, span, "others", args, named, ())
-    return LabelObjects(cls, tuple(_who(each, TRACK, span) for each in run.objects))
+    return LabelObjects(cls, tuple(_feature(each, TRACK, span) for each in run.objects))
 
 
 def count(run: Interpreter, span: Span, *args: ModelValue, **named: ModelValue) -> ModelValue:
-    """`count(C, within=R, ahead=True)`."""
+    """`count(C, within=R, ahead=True)`: how many label objects of a class there are, besides the ego."""
     if args and isinstance(args[0], OtherList) and len(args) == 1 and not named:
-        return how_many(args[0], span)
+        return count_others(args[0], span)
     cls = _class(run, span, "count", args, named, _FILTERS)
-    every = __all_of(run, cls, span)
+    every = _all_but_ego(run, cls, span)
     element = _element(every, span)
-    return _among(AmongOp.COUNT, every, element, _counting(run, named, span)(element), span)
+    return _among(AmongOp.COUNT, every, element, _filter(run, named, span)(element), span)
 
 
 def nearest(run: Interpreter, span: Span, *args: ModelValue, **named: ModelValue) -> ModelValue:
-    """`nearest(C, within=R, ahead=True)`."""
+    """`nearest(C, within=R, ahead=True)`: the label object of a class that is nearest to the ego."""
     cls = _class(run, span, "nearest", args, named, _FILTERS)
-    every, counts, ego = __all_of(run, cls, span), _counting(run, named, span), run.ego(span)
+    every, counts, ego = _all_but_ego(run, cls, span), _filter(run, named, span), run.ego(span)
     made = Nearest(cls, None, span, objects=every, counts=counts, ego=ego)
     made.properties.update({name: of_nearest(made, name, kind, span) for name, kind in OBSERVABLE.items()})
     return made
 
 
 def of_nearest(near: Nearest, name: str, kind: Kind, span: Span) -> Node:
-    """A property of the nearest that labels tell."""
+    """A property of the nearest object, which labels tell."""
     assert near.objects is not None
     assert near.counts is not None
     element = _element(near.objects, span)
@@ -107,16 +107,16 @@ def of_nearest(near: Nearest, name: str, kind: Kind, span: Span) -> Node:
 
 
 def is_nearest(one: Instance, other: Nearest, span: Span) -> Node:
-    """Whether an object is the nearest: it counts, and nobody else that counts comes before it."""
+    """Whether an object is the nearest one: it counts, and no other object that counts comes before it."""
     assert other.objects is not None
     assert other.counts is not None
     if one.index is None:
         raise fail("wrong-type", "only an object can be the nearest", span, f"this is {describe(one)}")
     objects, element = other.objects, _element(other.objects, span)
     counts, ego = other.counts(element), other.ego
-    same = _compare("==", _who(element, IDENTITY, span), _who(one, IDENTITY, span), span)
+    same = _compare("==", _feature(element, IDENTITY, span), _feature(one, IDENTITY, span), span)
     away, least = operators.distance_to(element, ego, span), operators.distance_to(one, ego, span)
-    ranks = _compare("<", _who(element, RANK, span), _who(one, RANK, span), span)
+    ranks = _compare("<", _feature(element, RANK, span), _feature(one, RANK, span), span)
     before = build.logic(
         LogicOp.OR,
         _compare("<", away, least, span),
@@ -132,7 +132,7 @@ def is_nearest(one: Instance, other: Nearest, span: Span) -> Node:
         span,
     )
     # where it is not seen, nothing is known of it, also where nobody is
-    seen = Compare(CompareOp.EQ, _who(one, IDENTITY, span), _who(one, IDENTITY, span), span=span)
+    seen = Compare(CompareOp.EQ, _feature(one, IDENTITY, span), _feature(one, IDENTITY, span), span=span)
     return Select(
         seen,
         (build.constant(False), _all_of((is_there, build.opposite(someone)), span=span)),
@@ -143,27 +143,27 @@ def is_nearest(one: Instance, other: Nearest, span: Span) -> Node:
 def list_elements(
     objects: LabelObjects, span: Span, visit: Callable[[Instance], tuple[tuple[Node, ...], ModelValue]]
 ) -> OtherList:
-    """A list with something of each of some label objects.
+    """A list comprehension over some label objects.
 
     Args:
         objects: The label objects.
         span: Where the list is made.
-        visit: Gives conditions on what stands for each, and what the list has of it.
+        visit: Evaluates the filters and the item of the comprehension, from the element.
     """
     element = _element(objects, span)
     return OtherList(objects, element, *visit(element))
 
 
 def is_element(value: ModelValue) -> bool:
-    """Whether a value stands for each of some label objects."""
+    """Whether a value is an element, which stands for any of some label objects."""
     return isinstance(value, Instance) and value.index is not None and value.index <= _FIRST_ELEMENT
 
 
 def same_object(one: Instance, other: Instance, span: Span) -> ModelValue:
-    """Whether what stands for label objects is an object, or what stands for others."""
+    """Whether an element and an object, or two elements, are one label object."""
     if one is other or one.index is None or other.index is None:
         return one is other
-    return _compare("==", _who(one, IDENTITY, span), _who(other, IDENTITY, span), span)
+    return _compare("==", _feature(one, IDENTITY, span), _feature(other, IDENTITY, span), span)
 
 
 def truth_of_list(op: str, items: OtherList, span: Span) -> Node:
@@ -178,8 +178,8 @@ def truth_of_list(op: str, items: OtherList, span: Span) -> Node:
     return _among(AmongOp.EVERY, items.objects, items.element, wanted, span)
 
 
-def how_many(items: OtherList | LabelObjects, span: Span) -> Node:
-    """`len` of a list, or of all others."""
+def count_others(items: OtherList | LabelObjects, span: Span) -> Node:
+    """`len` of a list comprehension over other label objects, or of all of them."""
     if isinstance(items, LabelObjects):
         return _among(AmongOp.COUNT, items, _element(items, span), build.constant(True), span)
     return _among(AmongOp.COUNT, items.objects, items.element, _all_of(items.conditions, span), span)
@@ -192,7 +192,7 @@ def _class(
     run: Interpreter, span: Span, name: str, args: tuple[ModelValue, ...], named: Mapping[str, ModelValue],
     filters: tuple[str, ...],
 ) -> ScenicClass:  # fmt: skip
-    """The class that a function is asked about, in a condition."""
+    """Read the arguments of a function, which stands in a condition: one class, and filters."""
     if run.course is None:
         raise fail("unsupported-construct", f"`{name}` can be asked in conditions only", span, "not in a condition",
                    ("ask it in `require`, `terminate when`, a monitor, or `record` it",))  # fmt: skip
@@ -208,16 +208,16 @@ def _class(
     return args[0]
 
 
-def __all_of(run: Interpreter, cls: ScenicClass, span: Span) -> LabelObjects:
-    """All of a class but the ego."""
-    return LabelObjects(cls, (_who(run.ego(span), TRACK, span),))
+def _all_but_ego(run: Interpreter, cls: ScenicClass, span: Span) -> LabelObjects:
+    """The label objects of a class besides the ego."""
+    return LabelObjects(cls, (_feature(run.ego(span), TRACK, span),))
 
 
-def _who(each: Instance, name: str, span: Span) -> Feature:
+def _feature(each: Instance, name: str, span: Span) -> Feature:
     return Feature(cast(int, each.index), name, "scalar", True, span=span)
 
 
-def _counting(run: Interpreter, named: Mapping[str, ModelValue], span: Span) -> Callable[[Instance], Node]:
+def _filter(run: Interpreter, named: Mapping[str, ModelValue], span: Span) -> Callable[[Instance], Node]:
     ahead = named.get("ahead", False)
     if not isinstance(ahead, bool):
         raise fail("wrong-type", "`ahead=` is True or False", span, f"this is {describe(ahead)}")
@@ -236,7 +236,7 @@ def _counting(run: Interpreter, named: Mapping[str, ModelValue], span: Span) -> 
 
 
 def _by_ends(condition: Node, element: Instance) -> Node:
-    """A condition of which numbers that are known up to two ends tell as much as they do."""
+    """A condition on numbers that are known up to two ends: unknown where the ends do not decide it."""
     if not any(map(has_ends, postorder((condition,)))):
         return condition
     certain, possible = certain_and_possible(condition, lambda _: False)
@@ -245,7 +245,7 @@ def _by_ends(condition: Node, element: Instance) -> Node:
 
 
 _all_of = partial(build.connect, LogicOp.AND)
-"""Conditions together."""
+"""The conjunction of conditions."""
 
 
 def _compare(op: str, left: Node, right: Node, span: Span) -> Node:
@@ -256,27 +256,27 @@ def _among(
     op: AmongOp, objects: LabelObjects, element: Instance, condition: Node, span: Span, *,
     distance: Node | None = None, value: Node | None = None,
 ) -> Node:  # fmt: skip
-    """Something about all of some label objects, closed over what is given from around.
+    """Ask something about some label objects; other values that the condition reads become inputs.
 
     Raises:
-        ScenarioError: unsupported-construct, where what is asked of each hangs on chance, or on a direction.
+        ScenarioError: unsupported-construct, where the condition depends on a random value or a direction.
     """
     given: dict[int, Node] = {}
     excluded, condition = objects.excluded, _by_ends(condition, element)
     asked = [each for each in (condition, distance, value) if each is not None]
-    closed = iter([_closed(each, cast(int, element.index), given, span) for each in asked])
+    closed = iter([_close_over(each, cast(int, element.index), given, span) for each in asked])
     body = Body(next(closed), *(None if each is None else next(closed) for each in (distance, value)))
     inputs = (*excluded, *given.values())
     chance = next((each for each in leaves(*inputs) if not isinstance(each, Index)), None)
     if chance is not None:
-        raise fail("unsupported-construct", "what is asked of other label objects hangs on a random value", span,
-                   "random here", ("ask it of what labels observe",))  # fmt: skip
+        raise fail("unsupported-construct", "a condition on other label objects depends on a random value", span,
+                   "random here", ("compare only with what labels observe",))  # fmt: skip
     kind = kind_of(value) if value is not None else "scalar" if op is AmongOp.COUNT else "boolean"
     return Among(op, objects.cls.category, body, kind, 1, len(excluded), inputs, span=span)
 
 
-def _closed(root: Node, element: int, given: dict[int, Node], span: Span) -> Node:
-    """An expression over an element as one of a body; what it takes from around is added to what is given.
+def _close_over(root: Node, element: int, given: dict[int, Node], span: Span) -> Node:
+    """Rewrite an expression over an element to the body of an `Among`; what it reads of others is added to the inputs.
 
     Raises:
         ScenarioError: unsupported-construct, for directions and choices at the place of the element.
@@ -288,7 +288,7 @@ def _closed(root: Node, element: int, given: dict[int, Node], span: Span) -> Nod
         if id(node) in depends or isinstance(node, Constant):
             return made.get(id(node), node)
         if isinstance(node, Index):
-            raise fail("unsupported-construct", "which of several lanes other label objects are in cannot be asked",
+            raise fail("unsupported-construct", "a condition cannot ask which lanes other label objects are in",
                        span, "at their places", ("ask whether they are in a region",))  # fmt: skip
         given.setdefault(id(node), node)
         number = list(given).index(id(node))
@@ -301,7 +301,9 @@ def _closed(root: Node, element: int, given: dict[int, Node], span: Span) -> Nod
         elif any(id(each) in depends for each in below):
             if isinstance(node, DirectionAt) or is_leaf(node):
                 what = "a direction" if isinstance(node, DirectionAt) else "a random value"
-                raise fail("unsupported-construct", f"{what} at the place of other label objects cannot be asked", span)
+                raise fail(
+                    "unsupported-construct", f"a condition cannot ask for {what} where other label objects are", span
+                )
             made[id(node)] = rebuild(node, tuple(map(part, below)))
         else:
             continue

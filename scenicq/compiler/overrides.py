@@ -38,13 +38,13 @@ def find_overrides(run: Interpreter, node: ast.Override, scope: Environment) -> 
     """
     target = run.evaluate(node.target, scope)
     if not isinstance(target, Instance) or target.index is None:
-        raise fail("wrong-type", "only objects have what can be overridden", node.target.span,
+        raise fail("wrong-type", "only objects can be overridden", node.target.span,
                    f"this is {describe(target)}")  # fmt: skip
     found: list[tuple[Instance, ModelValue, Span]] = []
     for each in node.specifiers:
         if not isinstance(each, ast.WithSpecifier) or each.property in _MOVING:
-            raise fail("wrong-value", "what moves an object cannot be overridden", each.span,
-                       "is as the recording has it", ("override its `behavior`",))  # fmt: skip
+            raise fail("wrong-value", "properties that move an object cannot be overridden", each.span,
+                       "comes from the recording", ("override its `behavior`",))  # fmt: skip
         if each.property != "behavior":
             raise fail("unsupported-construct", f"`override` of `{each.property}` is not supported", each.span,
                        "only a `behavior` is overridden here")  # fmt: skip

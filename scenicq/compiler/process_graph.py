@@ -19,9 +19,9 @@ from scenicq.compiler.assignment import assign
 from scenicq.compiler.coerce import read_over_time, to_boolean
 from scenicq.compiler.contracts import Contract, action_contract, behavior_contract
 from scenicq.compiler.coroutines import CoroutineCall, LibraryCall, MonitorDefinition, ScenarioDefinition, as_behavior
-from scenicq.compiler.courses import split, without_courses
+from scenicq.compiler.courses import forbid_courses, split_by_course
 from scenicq.compiler.environment import Environment
-from scenicq.compiler.exclusions import with_exclusions
+from scenicq.compiler.exclusions import collect_exclusions
 from scenicq.compiler.items import items_of
 from scenicq.compiler.local_values import HERE, Held, LocalValues
 from scenicq.compiler.logic import condition
@@ -147,11 +147,11 @@ class ProcessGraph:
     def follow(self, start: ProcessState) -> None:
         """Follow it from its start."""
         self.number(start)
-        with read_over_time(), without_courses(self.run):
+        with read_over_time(), forbid_courses(self.run):
             while self._todo:
                 number, state = self._todo.pop()
                 found = self.next_of(state)
-                self.steps[number] = self.made(found)
+                self.steps[number] = self.make_step(found)
                 if isinstance(found, Asked) and found.loose:
                     self.loose.add(number)
 
@@ -184,36 +184,36 @@ class ProcessGraph:
         return fail("runtime-error", f"the {self.word} has a loop that never waits", self.span,
                     "never gets to the next sample", ("write `wait` in the loop",))  # fmt: skip
 
-    def placed(self, found: Following) -> int:
+    def step_number(self, found: Following) -> int:
         """The number of the step for what happens next."""
-        return self.number(found) if isinstance(found, ProcessState) else self.add(self.made(found))
+        return self.number(found) if isinstance(found, ProcessState) else self.add(self.make_step(found))
 
-    def made(self, found: Following) -> ProcessStep:
+    def make_step(self, found: Following) -> ProcessStep:
         """The step for what happens next."""
         match found:
             case Asked():
                 if isinstance(found.node, Constant):
-                    step: ProcessStep = Goto(self.placed(found.then if found.node.value else found.otherwise))
+                    step: ProcessStep = Goto(self.step_number(found.then if found.node.value else found.otherwise))
                 else:
-                    step = Test(self.atom(found.node), self.placed(found.then), self.placed(found.otherwise))
+                    step = Test(self.atom(found.node), self.step_number(found.then), self.step_number(found.otherwise))
                 for guard, span in found.guards:
                     step = Test(self.atom(guard), self.add(step), self.add(Reject(span)))
                 return step
             case Ways():
-                return Choose(tuple(dict.fromkeys(map(self.placed, found.options))))
+                return Choose(tuple(dict.fromkeys(map(self.step_number, found.options))))
             case OnTimer():
-                return Due(found.timer, self.placed(found.then), self.placed(found.otherwise))
+                return Due(found.timer, self.step_number(found.then), self.step_number(found.otherwise))
             case TimerStarts():
-                return Arm(found.timer, found.after_s, self.placed(found.then), found.extends)
+                return Arm(found.timer, found.after_s, self.step_number(found.then), found.extends)
             case Waits():
                 then, timers = found.then, timers_of(found.then)
                 if self.resumable and then.modes:
                     self.afresh[self.number(then)] = self.number(replace(then, modes=(), seen=-1))
                 return Wait(self.number(then), tuple(sorted(timers)), found.activities)
             case Directs():
-                return replace(found.step, then=self.placed(found.then))
+                return replace(found.step, then=self.step_number(found.then))
             case OnRunning():
-                return IfRuns(found.scenario, self.placed(found.then), self.placed(found.otherwise))
+                return IfRuns(found.scenario, self.step_number(found.then), self.step_number(found.otherwise))
             case ProcessState():
                 return Goto(self.number(found))
             case _:
@@ -230,7 +230,7 @@ class ProcessGraph:
         """The names that a call sees."""
         frame = cast(CallFrame, state.frames[number])
         of = frame.call.of
-        names = {name: self.values.copied(held.value) for name, held in frame.names}
+        names = {name: self.values.copy_value(held.value) for name, held in frame.names}
         if self.agent is not None:
             names.setdefault("self", self.agent)
         around = Environment(self.names, cast(Environment, of.environment))
@@ -262,13 +262,13 @@ class ProcessGraph:
 
         key = wanted, state.frames[number], state.begun
         if key not in self._asked:
-            self._asked[key] = self.excluding(lambda: split(run, evaluated, wanted.span))
+            self._asked[key] = self.excluding(lambda: split_by_course(run, evaluated, wanted.span))
         node, guards = self._asked[key]
         return self.test(state, node, guards, then, otherwise, wanted.span)
 
     def excluding(self, work: Callable[[], _Result]) -> tuple[_Result, GraphGuards]:
         """What is worked out, with what it excludes."""
-        found, excluded = with_exclusions(self.run, work)
+        found, excluded = collect_exclusions(self.run, work)
         return found, tuple(excluded)
 
     def test(
@@ -301,7 +301,7 @@ class ProcessGraph:
         names = self.scope(state, number)
         _, guards = self.excluding(lambda: self.run.run((node,), names))
         if names.shared:
-            raise self.refused(node.span)
+            raise self.refusal(node.span)
         after = self.with_names(rest, number, names, node.span)
         return ask_guards(guards, after)
 
@@ -315,16 +315,16 @@ class ProcessGraph:
 
         def assigned(names: ModelValue) -> Following:
             call = cast(CallFrame, state.frames[number]).call
-            frame = CallFrame(call, self.held(cast("dict[str, ModelValue]", names)))
+            frame = CallFrame(call, self.hold_names(cast("dict[str, ModelValue]", names)))
             return replace(state, frames=(*state.frames[:number], frame, *state.frames[number + 1 :]))
 
         return self.with_drawn(state, cast(ModelValue, changed), span, assigned, variables=True)
 
-    def held(self, names: Mapping[str, ModelValue]) -> tuple[tuple[str, Held], ...]:
+    def hold_names(self, names: Mapping[str, ModelValue]) -> tuple[tuple[str, Held], ...]:
         """Variables in the order of their names."""
         return tuple((name, self.values.hold(names[name])) for name in sorted(names))
 
-    def evaluated(self, state: ProcessState, node: ast.Expression) -> tuple[ModelValue, GraphGuards]:
+    def evaluate(self, state: ProcessState, node: ast.Expression) -> tuple[ModelValue, GraphGuards]:
         """The value of an expression in the innermost call, and what it excludes."""
         return self.excluding(lambda: self.run.evaluate(node, self.scope(state, self.call_of(state))))
 
@@ -334,7 +334,7 @@ class ProcessGraph:
         """What a state does first."""
         self.run.budget.step(self.span)
         if state.seen >= 0:
-            return self.shown(state)
+            return self.ask_contract(state)
         if state.guards:
             first, *others = state.guards
             assert first.operand is not None
@@ -353,12 +353,12 @@ class ProcessGraph:
                 rest = replace(state, frames=(*below.frames, BlockFrame(frame.body[1:])))
                 return self.statement(state, frame.body[0], rest)
             case WhileFrame():
-                again = self.pushed(state, BlockFrame(frame.node.body))
-                return self.ask(state, frame.node.test, again, self.pushed(below, BlockFrame(frame.node.orelse)))
+                again = self.push(state, BlockFrame(frame.node.body))
+                return self.ask(state, frame.node.test, again, self.push(below, BlockFrame(frame.node.orelse)))
             case ForFrame():
                 if frame.done == len(frame.items.held):
-                    return self.pushed(below, BlockFrame(frame.node.orelse))
-                rest = self.pushed(below, replace(frame, done=frame.done + 1), BlockFrame(frame.node.body))
+                    return self.push(below, BlockFrame(frame.node.orelse))
+                rest = self.push(below, replace(frame, done=frame.done + 1), BlockFrame(frame.node.body))
                 number = self.call_of(state)
                 names = self.scope(state, number)
                 assign(self.run, frame.node.target, frame.items.held[frame.done].value, names)
@@ -376,7 +376,7 @@ class ProcessGraph:
                 again = replace(frame, running=-1)
                 return replace(state, frames=(*below.frames, again), resumed=len(below.frames), asked=0)
 
-    def pushed(self, state: ProcessState, *frames: ProcessFrame) -> ProcessState:
+    def push(self, state: ProcessState, *frames: ProcessFrame) -> ProcessState:
         """A state with more frames."""
         return replace(state, frames=(*state.frames, *frames))
 
@@ -386,26 +386,26 @@ class ProcessGraph:
         while at < len(state.frames) and not isinstance(state.frames[at], TryFrame):
             at += 1
         if at == len(state.frames):
-            return self.checked(replace(state, resumed=-1, asked=-1))
+            return self.ask_invariants(replace(state, resumed=-1, asked=-1))
         if state.asked < 0:
-            return self.checked(replace(state, resumed=at, asked=0), self.call_of(state, at))
+            return self.ask_invariants(replace(state, resumed=at, asked=0), self.call_of(state, at))
         frame = cast(TryFrame, state.frames[at])
         number = state.asked
         if number == len(frame.handlers):
-            return self.switched(state, at, number)
+            return self.switch_block(state, at, number)
         running = frame.running == number or any(block == number for block, _ in frame.waiting)
         if running:
-            return self.switched(state, at, number)
+            return self.switch_block(state, at, number)
         wanted = frame.conditions[number]
         interrupted = replace(state, asked=-1)
-        chosen = self.switched(interrupted, at, number)
+        chosen = self.switch_block(interrupted, at, number)
         following = replace(state, resumed=at, asked=number + 1)
         if wanted is None:
             return OnTimer(frame.timer, chosen, following)
         asked = self.ask(state, wanted, chosen, following, self.call_of(state, at))
         return replace(asked, loose=True) if isinstance(asked, Asked) else asked
 
-    def checked(self, state: ProcessState, number: int | None = None) -> ProcessState:
+    def ask_invariants(self, state: ProcessState, number: int | None = None) -> ProcessState:
         """A state in which the invariants of a call are asked first."""
         calls = [each for each, frame in enumerate(state.frames) if isinstance(frame, CallFrame)]
         if not calls:
@@ -414,7 +414,7 @@ class ProcessGraph:
         invariants = cast(CallFrame, state.frames[number]).call.of.guards("invariant")
         return replace(state, guards=invariants, of=number) if invariants else state
 
-    def switched(self, state: ProcessState, at: int, block: int) -> Following:
+    def switch_block(self, state: ProcessState, at: int, block: int) -> Following:
         """A state in which a block of a `try` runs."""
         frame = cast(TryFrame, state.frames[at])
         inner = state.frames[at + 1 :]
@@ -438,7 +438,7 @@ class ProcessGraph:
 
     def waits(self, rest: ProcessState, activity: Span, contracts: Sequence[Contract] = ()) -> Following:
         """Go on with a state at the next sample, by when some contracts must be kept."""
-        frames = self.aged(rest.frames, "", first=rest.first)
+        frames = self.age_frames(rest.frames, "", first=rest.first)
         found: list[tuple[Held, int]] = []
         used = timers_of(rest)
         started: list[tuple[int, float]] = []
@@ -461,7 +461,7 @@ class ProcessGraph:
             after = TimerStarts(timer, after_s, after)
         return after
 
-    def shown(self, state: ProcessState) -> Following:
+    def ask_contract(self, state: ProcessState) -> Following:
         """Ask whether a contract is kept: it is not if for some time no sample has shown what it asks for."""
         if state.seen == len(state.modes):
             return replace(state, seen=-1)
@@ -473,14 +473,14 @@ class ProcessGraph:
         assert contract.shows is not None
         return self.test(state, contract.shows, (), kept, broken, self.span)
 
-    def aged(self, frames: tuple[ProcessFrame, ...], place: str, *, first: bool) -> tuple[ProcessFrame, ...]:
+    def age_frames(self, frames: tuple[ProcessFrame, ...], place: str, *, first: bool) -> tuple[ProcessFrame, ...]:
         """Frames at the next sample."""
         found: list[ProcessFrame] = []
         for number, frame in enumerate(frames):
             here = f"{place}{number}"
 
             def old(held: Held, name: str, here: str = here) -> Held:
-                return self.values.aged(held, f"{here} {name}", first=first)
+                return self.values.age_value(held, f"{here} {name}", first=first)
 
             match frame:
                 case CallFrame():
@@ -495,7 +495,8 @@ class ProcessGraph:
                     found.append(BlockFrame(tuple(self.old_statement(each, old) for each in frame.body)))
                 case TryFrame():
                     waiting = tuple(
-                        (block, self.aged(inner, f"{here}.{block}.", first=first)) for block, inner in frame.waiting
+                        (block, self.age_frames(inner, f"{here}.{block}.", first=first))
+                        for block, inner in frame.waiting
                     )
                     body = tuple(self.old_statement(each, old) for each in frame.body)
                     found.append(replace(frame, waiting=waiting, body=body))
@@ -519,8 +520,8 @@ class ProcessGraph:
         if frame.phase == len(contracts):
             return below
         contract, activity = contracts[frame.phase], cast(LibraryCall, frame.call.value).span
-        following = self.pushed(below, LibraryFrame(frame.call, frame.phase + 1))
-        lasting = self.pushed(below, replace(frame, lasted=min(frame.lasted + 1, contract.least_steps)))
+        following = self.push(below, LibraryFrame(frame.call, frame.phase + 1))
+        lasting = self.push(below, replace(frame, lasted=min(frame.lasted + 1, contract.least_steps)))
         found = self.waits(lasting, activity, (contract,))
         if contract.over is not None and frame.lasted >= contract.least_steps:
             found = self.test(state, contract.over, (), following, found, self.span)
@@ -551,7 +552,7 @@ class ProcessGraph:
         """What a statement does, after which a state follows."""
         match node:
             case AskInvariants():
-                return self.checked(rest)
+                return self.ask_invariants(rest)
             case BeginBehavior():
                 return self.begin(state, node.what.value, rest, node.span)
             case PickBehavior():
@@ -569,7 +570,7 @@ class ProcessGraph:
             case ast.DynamicStatement(kind="wait for" | "wait until"):
                 until = node.operand if node.kind == "wait until" else None
                 duration = node.operand if node.kind == "wait for" else None
-                return self.limited(state, rest, (Idle(node.span),), until, duration, node.unit)
+                return self.run_limited(state, rest, (Idle(node.span),), until, duration, node.unit)
             case ast.Do() if self.agent is not None:
                 return self.do(state, node, rest)
             case ast.DynamicStatement(kind="terminate", operand=None) if self.scenario >= 0 and self.agent is not None:
@@ -578,17 +579,17 @@ class ProcessGraph:
             case ast.DynamicStatement(kind="terminate" | "terminate simulation", operand=None):
                 return Terminate(node.span)
             case ast.DynamicStatement(kind="abort"):
-                return self.left(state, node.span, TryFrame)
+                return self.leave(state, node.span, TryFrame)
             case ast.Global() if self.only_reads(state, node):
                 return rest
             case ast.Global() | ast.Nonlocal():
-                raise self.refused(node.span)
+                raise self.refusal(node.span)
             case ast.TryInterrupt() if not (node.handlers or node.orelse or node.final):
                 interrupts = tuple(reversed(node.interrupts))
                 frame = TryFrame(
                     tuple(each.condition for each in interrupts), tuple(each.body for each in interrupts), node.body
                 )
-                return replace(self.pushed(rest, frame), resumed=len(rest.frames), asked=0)
+                return replace(self.push(rest, frame), resumed=len(rest.frames), asked=0)
             case ast.Require(probability=None):
                 return self.ask(state, node.condition, rest, Reject(node.span))
             case ast.Assert():
@@ -596,17 +597,17 @@ class ProcessGraph:
             case ast.If():
                 return self.branch(state, node, 0, rest)
             case ast.While():
-                return self.pushed(rest, WhileFrame(node))
+                return self.push(rest, WhileFrame(node))
             case ast.For():
-                value, guards = self.evaluated(state, node.iterable)
+                value, guards = self.evaluate(state, node.iterable)
                 items = tuple([self.values.hold(each) for each in items_of(self.run, value, node.iterable.span)])
-                found = self.pushed(rest, ForFrame(node, self.items(items)))
+                found = self.push(rest, ForFrame(node, self.items(items)))
                 return ask_guards(guards, found)
             case ast.Break():
-                frames = self.left(state, node.span, WhileFrame, ForFrame).frames
+                frames = self.leave(state, node.span, WhileFrame, ForFrame).frames
                 return replace(state, frames=frames)
             case ast.Continue():
-                frames = self.left(state, node.span, WhileFrame, ForFrame, keep=True).frames
+                frames = self.leave(state, node.span, WhileFrame, ForFrame, keep=True).frames
                 return replace(state, frames=frames)
             case ast.Return():
                 return replace(state, frames=state.frames[: self.call_of(state)])
@@ -616,16 +617,16 @@ class ProcessGraph:
             ):  # fmt: skip
                 return self.simple(state, node, rest)
             case ast.TryInterrupt() | ast.Try() if node.handlers:
-                raise self.refused(node.handlers[0].span)
+                raise self.refusal(node.handlers[0].span)
             case _:
-                raise self.refused(node.span)
+                raise self.refusal(node.span)
 
     def only_reads(self, state: ProcessState, node: ast.Global) -> bool:
         """Whether none of the names that a `global` takes from the program gets a value in the innermost call."""
         body = cast("tuple[ast.Statement, ...]", cast(CallFrame, state.frames[self.call_of(state)]).call.of.body)
         return bound_names(body).isdisjoint(each.id for each in node.names)
 
-    def refused(self, span: Span) -> Exception:
+    def refusal(self, span: Span) -> Exception:
         """What is wrong with a statement that is not read."""
         word = span.text.split()[0].rstrip(":")
         if span.text.startswith("try"):
@@ -642,15 +643,13 @@ class ProcessGraph:
     def branch(self, state: ProcessState, node: ast.If, number: int, rest: ProcessState) -> Following:
         """One branch after the other."""
         if number == len(node.branches):
-            return self.pushed(rest, BlockFrame(node.orelse))
+            return self.push(rest, BlockFrame(node.orelse))
         branch = node.branches[number]
         others = ast.If(node.span, node.branches[number + 1 :], node.orelse)
-        other = (
-            self.pushed(rest, BlockFrame((others,))) if others.branches else self.pushed(rest, BlockFrame(node.orelse))
-        )
-        return self.ask(state, branch.test, self.pushed(rest, BlockFrame(branch.body)), other)
+        other = self.push(rest, BlockFrame((others,))) if others.branches else self.push(rest, BlockFrame(node.orelse))
+        return self.ask(state, branch.test, self.push(rest, BlockFrame(branch.body)), other)
 
-    def left(self, state: ProcessState, span: Span, *kinds: type, keep: bool = False) -> ProcessState:
+    def leave(self, state: ProcessState, span: Span, *kinds: type, keep: bool = False) -> ProcessState:
         """A state in which the innermost frame of a kind of the call is left, or where it goes on."""
         for number in reversed(range(len(state.frames))):
             frame = state.frames[number]
@@ -658,14 +657,14 @@ class ProcessGraph:
                 return replace(state, frames=state.frames[: number + keep])
             if isinstance(frame, CallFrame):
                 break
-        raise fail("parse-error", f"`{span.text.split()[0]}` stands outside of what it leaves", span, "leaves nothing")
+        raise fail("parse-error", f"`{span.text.split()[0]}` has nothing to leave here", span, "leaves nothing")
 
     def take(self, state: ProcessState, node: ast.Take, rest: ProcessState) -> Following:
         """Take actions."""
         values: list[ModelValue] = []
         excluded: list[tuple[Node, Span]] = []
         for expression in node.actions:
-            value, guards = self.evaluated(state, expression)
+            value, guards = self.evaluate(state, expression)
             excluded += guards
             several = isinstance(value, list | tuple) and len(node.actions) == 1
             values += list(cast("list[ModelValue]", value)) if several else [value]
@@ -695,12 +694,12 @@ class ProcessGraph:
             following: How it goes on.
             variables: Whether it has those that are assigned, which no longer use what stood for an earlier draw.
         """
-        for leaf in self.values.drawn(value):
+        for leaf in self.values.drawn_variables(value):
             if isinstance(leaf, Index):
-                settled = self.values.each(value, leaf)
+                settled = self.values.outcomes_of(value, leaf)
                 return any_of([self.with_drawn(state, each, span, following, variables=variables) for each in settled])
             names = cast("dict[str, ModelValue]", value) if variables else {}
-            targets = tuple(name for name, each in names.items() if leaf in self.values.drawn(each))
+            targets = tuple(name for name, each in names.items() if leaf in self.values.drawn_variables(each))
             value = self.values.without(value, leaf, self.unknown(leaf, state, span, targets))
         return following(value)
 
@@ -731,7 +730,7 @@ class ProcessGraph:
         values: list[ModelValue] = []
         excluded: list[tuple[Node, Span]] = []
         for expression in node.behaviors:
-            value, guards = self.evaluated(state, expression)
+            value, guards = self.evaluate(state, expression)
             excluded += guards
             if node.schedule and isinstance(value, dict) and len(node.behaviors) == 1:
                 weights = cast("dict[ModelValue, ModelValue]", value)
@@ -744,7 +743,7 @@ class ProcessGraph:
             inner: GraphStatement = BeginBehavior(held[0], node.span) if not node.schedule else PickBehavior(
                 held, node.schedule == "shuffle", node.span
             )  # fmt: skip
-            return self.limited(state, rest, (inner,), node.until, node.duration, node.unit)
+            return self.run_limited(state, rest, (inner,), node.until, node.duration, node.unit)
 
         after = self.with_drawn(state, values, node.span, done)
         return ask_guards(tuple(excluded), after)
@@ -753,17 +752,17 @@ class ProcessGraph:
         """What is done, as a call."""
         return as_behavior(value, span)
 
-    def limited(
+    def run_limited(
         self, state: ProcessState, rest: ProcessState, body: tuple[GraphStatement, ...], until: ast.Expression | None,
         duration: ast.Expression | None, unit: str,
     ) -> Following:  # fmt: skip
         """Do something until a condition holds or a time is over, or to its end."""
-        checked = self.pushed(rest, BlockFrame((AskInvariants(),)))
+        checked = self.push(rest, BlockFrame((AskInvariants(),)))
         if until is None and duration is None:
-            return self.pushed(checked, BlockFrame(body))
+            return self.push(checked, BlockFrame(body))
         if until is not None:
             frame = TryFrame((until,), ((),), body, ends=True)
-            return replace(self.pushed(checked, frame), resumed=len(checked.frames), asked=0)
+            return replace(self.push(checked, frame), resumed=len(checked.frames), asked=0)
         assert duration is not None
         after_s = self.seconds(self.run, duration, unit, self.scope(state, self.call_of(state)))
         if after_s <= 0:
@@ -771,7 +770,7 @@ class ProcessGraph:
         timer = free_timer(timers_of(checked))
         frame = TryFrame((None,), ((),), body, timer, ends=True)
         # no time is over at the sample at which it starts
-        found = self.switched(self.pushed(checked, frame), len(checked.frames), len(frame.handlers))
+        found = self.switch_block(self.push(checked, frame), len(checked.frames), len(frame.handlers))
         return TimerStarts(timer, after_s, found)
 
     def begin(self, state: ProcessState, value: ModelValue, rest: ProcessState, span: Span) -> Following:
@@ -781,27 +780,27 @@ class ProcessGraph:
                 if sum(isinstance(frame, CallFrame) for frame in state.frames) > LIMITS.call_nesting:
                     raise fail("budget-exceeded", f"calls are nested deeper than {LIMITS.call_nesting}", span,
                                "this call", ("replace the recursion by a loop",))  # fmt: skip
-                found = self.called(rest, value)
+                found = self.push_call(rest, value)
                 guards = value.of.guards("precondition") + value.of.guards("invariant")
                 return replace(found, guards=guards, of=len(rest.frames)) if guards else found
             case LibraryCall() if not value.of.is_action:
-                return self.pushed(rest, LibraryFrame(self.values.hold(value)))
+                return self.push(rest, LibraryFrame(self.values.hold(value)))
             case Choice():
-                return self.chosen(
-                    value, lambda option: self.pushed(rest, BlockFrame((BeginBehavior(option, span),))), span
+                return self.follow_choice(
+                    value, lambda option: self.push(rest, BlockFrame((BeginBehavior(option, span),))), span
                 )
             case _:
                 raise fail("wrong-type", "this is no behavior", span, f"this is {describe(value)}")
 
-    def called(self, state: ProcessState, call: CoroutineCall) -> ProcessState:
+    def push_call(self, state: ProcessState, call: CoroutineCall) -> ProcessState:
         """A state in which a call has begun."""
         body = cast("tuple[ast.Statement, ...]", call.of.body)
-        return self.pushed(state, CallFrame(call, self.held(call.given)), BlockFrame(body))
+        return self.push(state, CallFrame(call, self.hold_names(call.given)), BlockFrame(body))
 
-    def chosen(self, choice: Choice, following: Callable[[Held], ProcessState], span: Span) -> Following:
+    def follow_choice(self, choice: Choice, following: Callable[[Held], ProcessState], span: Span) -> Following:
         """Go on with the option that a random choice comes out as: any that is drawn now, or that of the scene."""
         states = [following(self.values.hold(as_behavior(each, span))) for each in choice.options]
-        if self.values.drawn(choice.index):
+        if self.values.drawn_variables(choice.index):
             return Ways(tuple(states))
         found: Following = states[-1]
         for number in reversed(range(len(states) - 1)):
@@ -816,11 +815,11 @@ class ProcessGraph:
         if len(node.enabled) < len(node.options):
             value = node.options[len(node.enabled)].value
             yes, no = (
-                self.pushed(rest, BlockFrame((replace(node, enabled=(*node.enabled, each)),))) for each in (True, False)
+                self.push(rest, BlockFrame((replace(node, enabled=(*node.enabled, each)),))) for each in (True, False)
             )
             if not isinstance(value, CoroutineCall) or not value.of.guards("precondition", "invariant"):
                 return yes
-            return self.enabled(state, value, yes, no)
+            return self.ask_enabled(state, value, yes, no)
         enabled = [number for number, each in enumerate(node.enabled) if each]
         if not enabled:
             return Reject(node.span)
@@ -828,13 +827,13 @@ class ProcessGraph:
         for number in enabled:
             others = (*node.options[:number], *node.options[number + 1 :])
             later = (PickBehavior(others, node.shuffle, node.span),) if node.shuffle else ()
-            ways.append(self.pushed(rest, BlockFrame((BeginBehavior(node.options[number], node.span), *later))))
+            ways.append(self.push(rest, BlockFrame((BeginBehavior(node.options[number], node.span), *later))))
         return ways[0] if len(ways) == 1 else Ways(tuple(ways))
 
-    def enabled(self, state: ProcessState, call: CoroutineCall, yes: ProcessState, no: ProcessState) -> Following:
+    def ask_enabled(self, state: ProcessState, call: CoroutineCall, yes: ProcessState, no: ProcessState) -> Following:
         """Go on by whether a behavior may begin."""
         found: Following = yes
-        within = self.called(state, call)
+        within = self.push_call(state, call)
         for guard in reversed(call.of.guards("precondition") + call.of.guards("invariant")):
             assert guard.operand is not None
             found = self.ask(within, guard.operand, found, no)
@@ -872,7 +871,7 @@ def process_of(
     asked: list[tuple[GraphGuards, Node, Span]] = []
     start = ProcessState(())
     if isinstance(call, CoroutineCall):
-        start = graph.called(start, call)
+        start = graph.push_call(start, call)
         with read_over_time():
             for guard in call.of.guards("precondition") + call.of.guards("invariant"):
                 found = graph.ask(start, cast(ast.Expression, guard.operand), End(), Reject(guard.span))
@@ -884,7 +883,7 @@ def process_of(
                     case _:
                         pass
     else:
-        start = graph.pushed(start, BlockFrame((BeginBehavior(values.hold(call), span),)))
+        start = graph.push(start, BlockFrame((BeginBehavior(values.hold(call), span),)))
     graph.follow(start)
     if has_circle(graph.steps, graph.loose):
         raise graph.spins()

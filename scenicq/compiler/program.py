@@ -12,8 +12,8 @@ from typing import TypeVar, cast
 
 from scenicq.budget import Exhausted, limited
 from scenicq.compiler import operators
-from scenicq.compiler.absent import check_directions, listed
-from scenicq.compiler.arithmetic import no_number
+from scenicq.compiler.absent import check_directions, list_names
+from scenicq.compiler.arithmetic import number_error
 from scenicq.compiler.coerce import PARTIAL, to_node, to_region, to_scalar, to_vector
 from scenicq.compiler.composition_graph import ComposedScenario
 from scenicq.compiler.deviations import is_zero
@@ -170,7 +170,7 @@ def _borrowed(
         if isinstance(node, ast.Name) and node.id in names and node.id not in scope.names:
             message = f"the program imports no model: `{node.id}` is taken from `{library}`"
             line = f"import {library}" if library == "gtaLib" else f"model {library}"
-            hints = (f"`{line}` says what is meant",)
+            hints = (f"`{line}` makes this explicit",)
             return (Diagnostic("unknown-model", message, node.span, hints=hints, severity="warning"),)
     return ()
 
@@ -180,7 +180,7 @@ def _anywhere(objects: list[Instance]) -> tuple[Diagnostic, ...]:
     freed = [each for each in objects if _is_anywhere(each)]
     if not freed:
         return ()
-    named = listed(dict.fromkeys(each.cls.name for each in freed))
+    named = list_names(dict.fromkeys(each.cls.name for each in freed))
     message = f"there is no map: {named} may be anywhere and head anywhere, where the program says nothing else"
     return (Diagnostic("no-map", message, freed[0].span, severity="note"),)
 
@@ -209,7 +209,7 @@ def _no_ego(run: Interpreter, module: ast.Program, version: int) -> ScenarioErro
     for found in run.ignored:
         if found.span is not None and found.span.text.startswith("compose"):
             return fail("no-ego", "the scenario that the program runs sets up no ego", found.span,
-                        "what others make is not read: it is not there in the initial scene",
+                        "objects that other scenarios make are not in the initial scene",
                         ("make the ego in the `setup` block",))  # fmt: skip
     example = "ego = new Car" if version == 3 else "ego = Car"
     return fail("no-ego", "the program defines no ego", _start(module.source), "no object is called `ego`",
@@ -300,7 +300,7 @@ def _at_the_end(work: Callable[[], _Result], span: Span | None) -> _Result:
     try:
         return work()
     except ArithmeticError as error:
-        raise no_number(error, span, "of this") from None
+        raise number_error(error, span, "of this") from None
 
 
 def _names(objects: list[Instance]) -> list[str]:
@@ -358,9 +358,9 @@ def _object(instance: Instance, name: str, *, on_courses: bool) -> ScenarioObjec
         if node is not None:
             asked = next((each for each in postorder((node,)) if has_ends(each)), None) if on_courses else None
             if asked is not None:
-                raise fail("unsupported-construct", "what is asked of courses is what labels show: put it in `require`",
+                raise fail("unsupported-construct", "labels show courses, so a condition on them belongs in `require`",
                            asked.span or span, "not in a property",
-                           ("place the object with other words, and require this of it",))  # fmt: skip
+                           ("place the object by another specifier, and require this of it",))  # fmt: skip
             properties[key] = Property(node, key in instance.explicit, span)
         elif key in instance.explicit and value is not None:
             uncomparable[key] = span

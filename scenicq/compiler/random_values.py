@@ -29,9 +29,9 @@ __all__ = [
     "lift",
     "make_choice",
     "nothing_to_choose",
-    "of_common_type",
     "possible_values",
     "regions_apart",
+    "to_common_type",
 ]
 
 LACKING = frozenset({"map-lacks", "runtime-error"})
@@ -135,7 +135,7 @@ def holds_instances(value: ModelValue) -> bool:
     return isinstance(value, Choice) and any(isinstance(each, Instance) for each in possible_values(value))
 
 
-def of_common_type(value: ModelValue, span: Span | None) -> ModelValue:
+def to_common_type(value: ModelValue, span: Span | None) -> ModelValue:
     """A random choice as one between what all its outcomes are: objects, oriented points, or places.
 
     Scenic decides what is next to something before it is drawn, by the type that all outcomes have in common: of an

@@ -10,12 +10,12 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal, cast
 
 from scenicq.compiler.coerce import kind_of_model, read_over_time, to_node
-from scenicq.compiler.courses import split
+from scenicq.compiler.courses import split_by_course
 from scenicq.compiler.environment import Environment
-from scenicq.compiler.exclusions import with_exclusions
+from scenicq.compiler.exclusions import collect_exclusions
 from scenicq.compiler.requirements import defer_value
 from scenicq.compiler.values import Delayed, ModelValue, describe, fail
-from scenicq.errors import Diagnostic, ScenarioError, Span, plain
+from scenicq.errors import Diagnostic, ScenarioError, Span, printable
 from scenicq.forest import build
 from scenicq.forest.kinds import kind_of
 from scenicq.forest.nodes import Constant, LogicOp, Node, Select, Undefined
@@ -59,7 +59,7 @@ def record_statement(run: Interpreter, node: ast.DynamicStatement, scope: Enviro
     """
     assert node.operand is not None
     line, _ = node.span.source.position(node.span.start)
-    name = plain(node.name) or f"record{line}"
+    name = printable(node.name) or f"record{line}"
     for word in node.manners:
         run.ignored.append(_warning(f"`{word}` of `record` is left out", node.span,
                                     "the value at each sample is recorded, in the results"))  # fmt: skip
@@ -70,7 +70,7 @@ def record_statement(run: Interpreter, node: ast.DynamicStatement, scope: Enviro
     operand, evaluated = node.operand, defer_value(run, node.operand, scope, node.span)
 
     def value() -> Node:
-        return split(run, lambda: _as_recorded(evaluated(), operand.span), operand.span)
+        return split_by_course(run, lambda: _as_recorded(evaluated(), operand.span), operand.span)
 
     run.records.append(RecordStatement(name, _WHEN[node.kind], value, node.span))
 
@@ -98,7 +98,7 @@ def recorded_values(run: Interpreter) -> tuple[RecordedValue, ...]:
     for each in run.records:
         try:
             with read_over_time():
-                value, excluded = with_exclusions(run, each.value)
+                value, excluded = collect_exclusions(run, each.value)
         except ScenarioError as error:
             for told in error.diagnostics:
                 message = f"`{each.name}` is not recorded: {told.message}"

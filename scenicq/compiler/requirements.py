@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from scenicq.compiler import expressions
 from scenicq.compiler.coerce import to_boolean
-from scenicq.compiler.courses import split
+from scenicq.compiler.courses import split_by_course
 from scenicq.compiler.environment import Environment
 from scenicq.compiler.logic import condition
 from scenicq.compiler.temporal import is_temporal
@@ -42,7 +42,7 @@ def requirement(run: Interpreter, node: ast.Require, scope: Environment) -> Requ
     wanted = node.condition
     if is_temporal(wanted) and node.probability is not None and probability != 1:
         raise fail("wrong-value", "a requirement with operators of time has no probability", node.probability.span,
-                   "only 1 can stand here", ("leave the probability out",))  # fmt: skip
+                   "only 1 is allowed here", ("leave the probability out",))  # fmt: skip
     if run.timed is not None and is_temporal(wanted):
         run.timed.require(lambda expression: defer(run, expression, scope, node.span), wanted, node.span)
         return None
@@ -65,7 +65,7 @@ def defer(run: Interpreter, wanted: ast.Expression, scope: Environment, span: Sp
                        ("write `F at V`",))  # fmt: skip
         return to_boolean(value, wanted.span)
 
-    return lambda: split(run, truth, wanted.span)
+    return lambda: split_by_course(run, truth, wanted.span)
 
 
 def defer_value(

@@ -36,7 +36,7 @@ from scenicq.geometry.shapes import Shape
 if TYPE_CHECKING:
     from scenicq.compiler.interpreter import Interpreter
 
-__all__ = ["is_worked_out", "names_worked_out", "worked_out"]
+__all__ = ["computed_attribute", "computed_names", "is_computed"]
 
 _CURB, _SIDEWALK, _SHOULDER = 5.0, 8.0, 1.0
 """Metres from a road's right edge within which a curb, sidewalk or shoulder belongs to it."""
@@ -226,18 +226,20 @@ _REFUSED: dict[str, tuple[type | tuple[type, ...], str]] = {
 }
 
 
-def is_worked_out(name: str) -> bool:
+def is_computed(name: str) -> bool:
     """Whether an attribute is worked out for elements of some kind."""
     return name in _WORKED_OUT or name.removeprefix("_") in _UNDERSCORED
 
 
-def names_worked_out(value: NetworkElement | Network) -> set[str]:
+def computed_names(value: NetworkElement | Network) -> set[str]:
     """The attributes that are worked out for a value."""
     found = {name for name, works in _WORKED_OUT.items() if any(isinstance(value, kind) for kind, _ in works)}
     return found | {f"_{name}" for name in found & _UNDERSCORED}
 
 
-def worked_out(run: Interpreter, value: NetworkElement | Network, name: str, span: Span) -> tuple[ModelValue] | None:
+def computed_attribute(
+    run: Interpreter, value: NetworkElement | Network, name: str, span: Span
+) -> tuple[ModelValue] | None:
     """An attribute that is worked out, in a tuple of its own; None for any other.
 
     Raises:
@@ -255,7 +257,7 @@ def worked_out(run: Interpreter, value: NetworkElement | Network, name: str, spa
             return (build.constant(found, span) if isinstance(found, Region) else cast(ModelValue, found),)
     if name in _UNKNOWN and isinstance(value, _UNKNOWN[name][0]):
         raise fail("map-lacks", f"the map does not say {_UNKNOWN[name][1]}", span, "not in this map",
-                   ("leave out what the program asks of it",))  # fmt: skip
+                   ("leave out what needs it",))  # fmt: skip
     if name in _REFUSED and isinstance(value, _REFUSED[name][0]):
         raise fail("unsupported-construct", f"`{name}` is not supported here", span, "of a whole road",
                    (_REFUSED[name][1],))  # fmt: skip

@@ -21,10 +21,10 @@ from scenicq.forest.nodes import (
 from scenicq.forest.walk import children
 from scenicq.limits import LIMITS
 
-__all__ = ["in_order", "rounded", "truncated"]
+__all__ = ["round_number", "sort_numbers", "truncate_number"]
 
 
-def in_order(values: Sequence[Node], span: Span) -> list[Node]:
+def sort_numbers(values: Sequence[Node], span: Span) -> list[Node]:
     """Numbers from the least to the greatest."""
     found = list(values)
     for last in range(len(found) - 1, 0, -1):
@@ -35,7 +35,7 @@ def in_order(values: Sequence[Node], span: Span) -> list[Node]:
     return found
 
 
-def truncated(value: Node, span: Span) -> Node:
+def truncate_number(value: Node, span: Span) -> Node:
     """A number without its fraction."""
     if _is_whole(value):
         return value
@@ -49,14 +49,14 @@ def truncated(value: Node, span: Span) -> Node:
     )
 
 
-def rounded(value: Node, digits: int, span: Span) -> Node:
+def round_number(value: Node, digits: int, span: Span) -> Node:
     """A number to a number of decimals; the one in the middle between two goes to the even one, as in Python."""
     if not digits and _is_whole(value):
         return value
     if digits:
         factor = build.constant(10.0**digits, span)
         scaled = build.arithmetic(ArithmeticOp.MUL, value, factor, span=span)
-        return build.arithmetic(ArithmeticOp.DIV, rounded(scaled, 0, span), factor, span=span)
+        return build.arithmetic(ArithmeticOp.DIV, round_number(scaled, 0, span), factor, span=span)
     half = build.arithmetic(ArithmeticOp.ADD, value, build.constant(0.5, span), span=span)
     up = build.arithmetic(ArithmeticOp.FLOOR, half, span=span)
     if _never_between(value):

@@ -14,9 +14,9 @@ from scenicq.compiler.comparisons import compare
 from scenicq.compiler.expressions import call
 from scenicq.compiler.items import components, is_vector, items_of
 from scenicq.compiler.known_properties import as_constant, known_truth
-from scenicq.compiler.other_objects import how_many, truth_of_list
+from scenicq.compiler.other_objects import count_others, truth_of_list
 from scenicq.compiler.random_values import each_existing, is_choice
-from scenicq.compiler.rounding import in_order
+from scenicq.compiler.rounding import sort_numbers
 from scenicq.compiler.values import Builtin, Choice, Function, LabelObjects, ModelValue, OtherList, fail
 from scenicq.errors import Span
 from scenicq.forest.nodes import Constant
@@ -60,11 +60,11 @@ def sequence_functions(run: Interpreter) -> dict[str, ModelValue]:
         random, backwards = any(is_random(value) for value, _ in keyed), truth(reverse, span)
         if random and key is None and all(kind_of_model(item) == "scalar" for _, item in keyed):
             run.budget.step(span, len(keyed) ** 2)
-            numbers = in_order([to_scalar(item, span) for _, item in keyed], span)
+            numbers = sort_numbers([to_scalar(item, span) for _, item in keyed], span)
             return numbers[::-1] if backwards else numbers
         if random and run.course is None:
             raise fail("random-branch", "random values have no known order", span, "random here",
-                       ("sort by something known", "state conditions with `require`"))  # fmt: skip
+                       ("sort by a known value", "state conditions with `require`"))  # fmt: skip
 
         def before(a: tuple[ModelValue, ModelValue], b: tuple[ModelValue, ModelValue]) -> int:
             # all that sorting asks
@@ -100,7 +100,7 @@ def sequence_functions(run: Interpreter) -> dict[str, ModelValue]:
             keys = [_plain(as_constant(run, apply(key, value, span))) for value in values]
             if run.course is None and any(map(is_random, keys)):
                 raise fail("random-branch", "random values have no known order", span, "random here",
-                           ("compare by something known", "state conditions with `require`"))  # fmt: skip
+                           ("compare by a known value", "state conditions with `require`"))  # fmt: skip
             best = 0
             for number in range(1, len(values)):
                 one, other = (number, best) if name == "min" else (best, number)
@@ -115,7 +115,7 @@ def sequence_functions(run: Interpreter) -> dict[str, ModelValue]:
 
         def apply_to(span: Span, *args: ModelValue) -> ModelValue:
             if name == "len" and len(args) == 1 and isinstance(args[0], OtherList | LabelObjects):
-                return how_many(args[0], span)
+                return count_others(args[0], span)
             return plain.call(span, *(components(run, each, span) if is_vector(each) else each for each in args))
 
         return apply_to

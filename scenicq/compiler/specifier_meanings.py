@@ -14,7 +14,7 @@ from scenicq.compiler.environment import FIRST_NAMES, Budget
 from scenicq.compiler.following import follow
 from scenicq.compiler.operations import values_of
 from scenicq.compiler.orientations import orientation, surely_gives_a_heading
-from scenicq.compiler.random_values import holds_instances, lift, make_choice, of_common_type
+from scenicq.compiler.random_values import holds_instances, lift, make_choice, to_common_type
 from scenicq.compiler.specifiers import BoundSpecifier
 from scenicq.compiler.values import Choice, Delayed, Instance, ModelValue, fail
 from scenicq.errors import Span
@@ -305,7 +305,7 @@ def bind(node: ast.Specifier, evaluate: Evaluate, around: SpecifierContext) -> B
         return _with(node, evaluate(node.value), around)
     values = values_of(node, evaluate, around.ego)
     if node.row.operands[0].name == "reference":
-        values[0] = of_common_type(values[0], node.span)
+        values[0] = to_common_type(values[0], node.span)
     bound = _bind_each(_MEANINGS[node.row], values, node.span, around)
     return _as_parent(bound) if around.version == 3 and "heading" in bound.optionally else bound
 

@@ -34,7 +34,7 @@ class BoundSpecifier:
         evaluate: Values of the properties, given the object so far.
         span: The specifier in the program.
         explicit: Whether the user's program rather than a library says it.
-        rank: Of several optional specifiers of a property the one of the lowest rank counts (Scenic 3's priorities).
+        rank: The lowest rank counts among several optional specifiers of a property (Scenic 3's priorities).
         modifies: A property that it gives only if no other specifier does; if one does, it adds a condition instead.
         condition: The condition: requires something of the finished object.
         perhaps: Whether Scenic may take what it gives optionally or the class's default, as it happens.
@@ -165,7 +165,9 @@ def _by_default(error: ScenarioError, instance: Instance, name: str) -> Scenario
         if each.code == "map-lacks":
             notes = (*each.notes, Note(each.span, "the default")) if each.span is not None else each.notes
             label = f"the default `{name}` of `{instance.cls.name}` needs it"
-            anything = f"`{_FREELY[name]}` asks nothing of the map" if name in _FREELY else f"`with {name} ...` sets it"
+            anything = (
+                f"`{_FREELY[name]}` needs nothing from the map" if name in _FREELY else f"`with {name} ...` sets it"
+            )
             each = replace(each, span=instance.span, label=label, hints=(anything,), notes=notes)  # noqa: PLW2901
         told.append(each)
     return ScenarioError(told)

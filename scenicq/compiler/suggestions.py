@@ -11,7 +11,7 @@ from scenicq.compiler.values import Instance, ModelValue, Module, describe, fail
 from scenicq.errors import ScenarioError, Span, similar
 from scenicq.geometry.elements import Lane, NetworkElement
 from scenicq.geometry.network import Network
-from scenicq.syntax.hints import BIKE_LANES, MOVES, STANDS, TURNS
+from scenicq.syntax.hints import BIKE_LANES_HINT, MOVING_HINT, STANDING_HINT, TURNING_HINT
 
 __all__ = ["unavailable_name", "unknown_attribute", "unknown_name"]
 
@@ -45,8 +45,8 @@ _NAMES: dict[str, tuple[str, ...]] = {
     ),
     "objects vehicles cars pedestrians others agents actors": (
         "a program names the objects that it asks for",
-        "`new Vehicle` asks for one vehicle, which every requirement may speak of",
-        "that there are no others can only be asked of all together, with `--exact`",
+        "`new Vehicle` asks for one vehicle, which requirements can name",
+        "`--exact` asks that no other objects are there",
     ),
     "divmod iter next slice ord chr bin hex oct ascii repr format bytes bytearray complex property staticmethod "
     "classmethod": (
@@ -95,9 +95,10 @@ _OF_SIGNS = "labels of signs are of class `Prop`"
 _BY_NAME = {
     "Sign": _OF_SIGNS, "StopSign": _OF_SIGNS, "TrafficSign": _OF_SIGNS,
     "distance": "`distance from a to b` has no brackets", "dist": "`distance from a to b` is the distance",
-    "angle": "`angle from a to b` has no brackets", "velocity": "`X.velocity` is that of an object X",
-    "speed": "`X.speed` is that of an object X", "heading": "`X.heading` is that of an object X",
-    "parked": STANDS, "stopped": STANDS, "moving": MOVES, "turning": TURNS, "bikeLane": BIKE_LANES,
+    "angle": "`angle from a to b` has no brackets", "velocity": "`X.velocity` is the velocity of an object X",
+    "speed": "`X.speed` is the speed of an object X", "heading": "`X.heading` is the heading of an object X",
+    **dict.fromkeys(("parked", "stopped"), STANDING_HINT), "moving": MOVING_HINT, "turning": TURNING_HINT,
+    "bikeLane": BIKE_LANES_HINT,
     "oncoming": "`facing Range(160, 200) deg relative to ego.heading`",
     "lane": "`X.lane` is the lane of an object X", "leftLane": "`X.laneSection.laneToLeft` is the lane left of X's",
     "rightLane": "`X.laneSection.laneToRight` is the lane right of X's",
@@ -109,18 +110,18 @@ _BY_NAME = {
     "Weather": "`param weather = 'rain'` compares what labels say of the weather",
     **{name: f"`on {region}` places an object there" for name, region in _OF_MAP.items()},
     **{name: f"a direction is an angle, to the left of north: `{angle} deg`" for name, angle in _COMPASS.items()},
-    "self": "`self` stands in classes alone; `require` after the object asks of it by its name",
+    "self": "`self` is for classes; a `require` after the object uses the object's name",
 }  # fmt: skip
-"""How the driving model says what people say with another name."""
+"""Hints for names that the driving model spells in another way."""
 _BESIDE = re.compile(
     r"(?i)_?(left|right)_?(lane|neighbou?r)?|(lane|neighbou?r)_?(to_?)?(left|right)|laneTo(Left|Right)"
 )
-"""What people call the lane beside another."""
-_RATE = "`angularSpeed` is how fast it turns, in radians a second"
+"""Names that authors give to the lane beside another."""
+_RATE = "`angularSpeed` is the rate at which it turns, in radians a second"
 _BY_ATTRIBUTE = {
     "yawrate": _RATE, "angularvelocity": _RATE, "turnrate": _RATE, "accel": "`acceleration` is along the course",
-    "isparked": STANDS, "parked": STANDS, "isstopped": STANDS, "stopped": STANDS, "isstationary": STANDS,
-    "ismoving": MOVES, "moving": MOVES,
+    **dict.fromkeys(("isparked", "parked", "isstopped", "stopped", "isstationary"), STANDING_HINT),
+    **dict.fromkeys(("ismoving", "moving"), MOVING_HINT),
     "category": "`new Bus` asks for a class", "type": "`new Bus` asks for a class",
     "occluded": "`beyond Y by Range(2, 30)` places an object where Y hides it from the ego",
     "isoccluded": "`beyond Y by Range(2, 30)` places an object where Y hides it from the ego",
@@ -129,7 +130,7 @@ _BY_ATTRIBUTE = {
 }  # fmt: skip
 """How Scenic says what people ask an object for, by the attribute in small letters."""
 _ASIDE = re.compile(r"^_|At$|Region$")
-"""Attributes of the map that are not listed to who looks for one: look-ups and regions, each of which has a twin."""
+"""Attributes of the map that hints do not list: look-ups and regions that another attribute gives, too."""
 _OWNER = re.compile(r"([A-Za-z_][\w.]{0,60})\.\Z")
 """The dotted name before an attribute."""
 
@@ -186,11 +187,11 @@ def unknown_attribute(value: ModelValue, name: str, known: set[str], place: str,
         has = ", ".join(f"`{each}`" for each in sorted(known) if not _ASIDE.search(each))
         hints = (f"`{called}` is what Scenic calls them",) if called in known else (f"it has {has}",)
     if isinstance(value, Network) and name in ("bikeLanes", "bikeLane", "bicycleLanes"):
-        hints = (BIKE_LANES,)
+        hints = (BIKE_LANES_HINT,)
     if is_thing and (said := _BY_ATTRIBUTE.get(name.replace("_", "").lower())):
         hints = (said,)
     if is_thing and not hints:
-        hints = (f"`{name}` can be read where labels of a dataset have it, which `scenicq check` is given, too",)
+        hints = (f"`{name}` can be read if labels of the dataset have it: give `scenicq check` the dataset, too",)
     if owner := _OWNER.search(span.source.text, 0, span.start):
         label = f"`{owner[1]}` is {shown}"
     return fail("unknown-attribute", message, span, label, hints)

@@ -10,7 +10,7 @@ from scenicq.compiler.coerce import read_over_time
 from scenicq.compiler.composition_graph import Composition, CompositionGraph
 from scenicq.compiler.coroutines import CoroutineCall, ScenarioDefinition, as_behavior
 from scenicq.compiler.environment import Environment
-from scenicq.compiler.exclusions import with_exclusions
+from scenicq.compiler.exclusions import collect_exclusions
 from scenicq.compiler.local_values import LocalValues
 from scenicq.compiler.process_graph import process_of
 from scenicq.compiler.process_states import GraphGuards
@@ -147,7 +147,7 @@ class TimedStatements:
         self.conditions.append(condition)
         return Atom(len(self.conditions) - 1)
 
-    def apart(self) -> TimedStatements:
+    def for_inner_run(self) -> TimedStatements:
         """What takes what a scenario says that begins within a run."""
         return TimedStatements(self.behaviors, self.reaction_s, actions=self.actions)
 
@@ -232,7 +232,7 @@ class TimedStatements:
             return None, []
         run.simulation = simulation(run)
         with read_over_time():
-            nodes, always = with_exclusions(run, lambda: [condition() for condition in self.conditions])
+            nodes, always = collect_exclusions(run, lambda: [condition() for condition in self.conditions])
         for requirement in self.requirements:
             if _known(requirement.formula, nodes) is False:
                 raise fail(

@@ -84,7 +84,7 @@ def leave_out(timed: TimedStatements, ignored: list[Diagnostic], kind: str, span
     timed.used = True
     is_import = kind.startswith("import of ")
     if kind not in _OF_BEHAVIORS and not is_import:
-        raise fail("unsupported-construct", f"`{kind}` cannot stand here", span, "no statement of a top level")
+        raise fail("unsupported-construct", f"`{kind}` cannot stand here", span, "not a statement of the top level")
     if timed.behaviors != "ignore":
         if is_import:
             return

@@ -20,7 +20,7 @@ from scenicq.syntax.walk import walk
 if TYPE_CHECKING:
     from scenicq.compiler.interpreter import Interpreter
 
-__all__ = ["NoValue", "evaluate_when_read", "read"]
+__all__ = ["NoValue", "evaluate_when_read", "read_value"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,7 +43,7 @@ def evaluate_when_read(
     """
     if not _is_pure(node, scope):
         return compute()
-    with run.excluded.apart() as found:
+    with run.excluded.collect_separately() as found:
         try:
             value: ModelValue = compute()
         except ScenarioError as error:
@@ -58,7 +58,7 @@ def evaluate_when_read(
     return value
 
 
-def read(run: Interpreter, value: ModelValue) -> ModelValue:
+def read_value(run: Interpreter, value: ModelValue) -> ModelValue:
     """A value whose name is read.
 
     Raises:

@@ -1,4 +1,4 @@
-"""Which objects there are hangs on how a run goes where scenarios begin in some runs alone: each case is a variant.
+"""Which objects there are depends on how a run goes where scenarios begin in some runs alone: each case is a variant.
 
 A variant has the objects of the scenarios that begin in its runs, and a run of it in which one of these does not begin
 is none. What begins with the first sample belongs to the initial scene of the variant.
@@ -228,7 +228,7 @@ def _reachable(process: Process, ended: set[int]) -> Process:
 
 
 def _without_silent(dynamics: Dynamics) -> Dynamics:
-    """The same without scenarios of which it makes no difference whether they have begun."""
+    """Remove the scenarios for which it makes no difference whether they have begun."""
     silent = {
         number for number, each in enumerate(dynamics.scenarios)
         if not each.requirements and not each.processes and number not in dynamics.needs

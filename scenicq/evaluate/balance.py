@@ -1,4 +1,4 @@
-"""How alike those are who are compared: what shares of either group lie where, and how far their means are apart.
+"""How similar two compared groups are: their shares by distance and the like, and how far their means are apart.
 
 What objects are matched by is alike by construction; what they are not matched by may differ, and a reader has to see
 it (Austin 2009, "Balance diagnostics for comparing the distribution of baseline covariates between treatment groups
@@ -37,7 +37,7 @@ class Covariate:
         by: Its name.
         parts: Each value, or class of values, with the share of the objects in question and that of the others.
         common: How much of either group the other has, too: 1 where both are spread alike.
-        means: Of both groups; nan of what is no number.
+        means: The means of both groups; nan where it is no number.
         apart: The difference of the means in standard deviations; nan of what is no number, or does not vary.
     """
 
@@ -64,7 +64,7 @@ class Balance:
 def balance(
     compared: ObjectComparison, detection: Detection, parameters: Mapping[str, tuple[Sequence[str], Numbers]]
 ) -> Balance | None:
-    """How alike those are who are compared; None where nobody is.
+    """How similar the two groups are; None where nothing is compared.
 
     Args:
         compared: The comparison, whose groups are numbers of label objects.

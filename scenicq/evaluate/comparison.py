@@ -40,7 +40,7 @@ __all__ = [
     "compare",
     "distance_names",
     "few_clusters",
-    "in_points",
+    "format_points",
     "p_text",
     "percent",
     "plural",
@@ -178,7 +178,7 @@ class ShareComparison:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Groups:
-    """Who is set beside whom, by numbers of objects.
+    """Which objects are compared with which, by their numbers.
 
     Attributes:
         own: Objects in question that are compared, shape (n,).
@@ -278,7 +278,7 @@ def plural(what: str, number: int) -> str:
     return what if number == 1 else f"{what}s"
 
 
-def in_points(difference: float, interval: Interval, unit: str = "") -> str:
+def format_points(difference: float, interval: Interval, unit: str = "") -> str:
     """A difference of shares in points with its interval, if it has one."""
     low, high = (100 * end for end in interval)
     return f"{100 * difference:+.0f}{unit}" + ("" if math.isnan(low) else f" [{low:+.0f}, {high:+.0f}]")

@@ -59,7 +59,7 @@ class Likeness:
     params: Numbers
 
     def taken(self, which: Numbers) -> Likeness:
-        """The same for some objects."""
+        """Select some of the objects."""
         return Likeness(*(getattr(self, name)[which] for name in self.__slots__))
 
 

@@ -102,7 +102,7 @@ class GroupDensity:
     _roots: dict[int, Node] = field(default_factory=dict[int, Node])
 
     def __post_init__(self) -> None:
-        """Sort the group's constraints by what their expressions hang on."""
+        """Sort the group's constraints by what their expressions depend on."""
         compared = [each for each in self.group.constraints if isinstance(each, Comparison)]
         self._roots = {
             id(each): _turned(each.expression) if each.property in ANGLES else each.expression for each in compared
@@ -266,7 +266,7 @@ class GroupDensity:
                 density.append(density_of(leaf, args, cast(Array, value)))
             return value
 
-        # all variables are met, also those that only distributions of others hang on
+        # all variables are met, also those that only distributions of others depend on
         plain = (*(self._roots[id(each)] for each in self._finite), *(each.expression for each in self._conditions))
         pivots: tuple[Node, ...] = tuple(leaf for leaf in self._pivots if whole[leaf.identity] is None)
         mixed = [leaf for leaf in self._pivots if whole[leaf.identity] is not None]
@@ -293,7 +293,7 @@ class GroupDensity:
         every = [self._roots.get(id(each), each.expression) for each in self.group.constraints]
         parents = [node for node in postorder(every) if any(child is index for child in children(node))]
         if parents != [choice] or [n for n in postorder(every) if choice in children(n)] != [leaf]:
-            raise CannotEvaluate("a region that other features hang on, too")
+            raise CannotEvaluate("a region on which other features depend, too")
         total = sum(index.weights)
         return tuple((weight / total, option) for weight, option in zip(index.weights, choice.options, strict=True))
 

@@ -533,7 +533,7 @@ class _Judge:
         return matched.matching & covered, matched.decided & ~matched.matching & covered
 
     def _roles(self, matched: Matched) -> Iterator[tuple[str, Bools]]:
-        """Who plays each role."""
+        """The label object of each role."""
         for role in matched.roles:
             mine = np.zeros(len(self.detection.objects.frame), dtype=np.bool_)
             mine[role.objects] = True

@@ -1,6 +1,6 @@
 """Evaluate expressions over many labels and many draws of their random variables at once.
 
-A number is an array that broadcasts to (labels, draws): what hangs on a label alone has shape (labels, 1), what is
+A number is an array that broadcasts to (labels, draws): what depends on a label alone has shape (labels, 1), what is
 drawn alike for all labels (1, draws). Undefined numbers are nan.
 """
 

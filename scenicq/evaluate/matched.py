@@ -144,7 +144,7 @@ def read_matched(
 
 
 def _mark_silent(unknown: Bools, frames: Frames, said: Completeness) -> None:
-    """Mark the frames of which results say nothing; who else may play a role in one that matches is not known, either.
+    """Mark the frames of which results say nothing; which other objects may play a role is not known, either.
 
     Args:
         unknown: Where they are marked.

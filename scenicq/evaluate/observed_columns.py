@@ -53,7 +53,7 @@ class ObservedColumns:
                 raise CannotEvaluate(f"`{each.property}` is no number")
 
     def holds(self, each: Comparison, value: Data) -> Array:
-        """Where a feature that hangs on finite choices has the label's value."""
+        """Where a feature that depends on finite choices has the label's value."""
         own = self.values[each.object, each.property]
         if isinstance(own, tuple) and isinstance(value, tuple):
             return np.hypot(own[0] - value[0], own[1] - value[1]) <= _SLACK

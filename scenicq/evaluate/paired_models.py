@@ -17,7 +17,7 @@ from scenicq.evaluate.comparison import (
     ShareComparison,
     clusters_to_tell,
     few_clusters,
-    in_points,
+    format_points,
     percent,
     share_of,
 )
@@ -61,7 +61,7 @@ class PairedComparison(ShareComparison):
         """All of it in one line."""
         if math.isnan(self.share.rate):
             return f"{self.about}: {self.model} and {self.baseline} have no object in common"
-        told = in_points(self.difference, self.interval, " points")
+        told = format_points(self.difference, self.interval, " points")
         apart = "" if math.isnan(self.interval[0]) else f" ({told})"
         missed = f"{self.model} missed {percent(self.share)} of {self.about}, {self.baseline} {percent(self.other)}"
         return f"{missed}{apart}{self.conclude(self.baseline)}"

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scenicq.evaluate.comparison import Share, in_points, percent, plural
+from scenicq.evaluate.comparison import Share, format_points, percent, plural
 from scenicq.evaluate.resampling import CLUSTERS, LEVEL, Interval, means_by, student, sums_by
 
 __all__ = ["PairedRuns", "pair_runs"]
@@ -58,7 +58,7 @@ class PairedRuns:
         units = f"{self.pairs} {plural(self.unit, self.pairs)}"
         text = f"in {units} that runs rebuild {percent(self.real)} are missed and {100 * self.simulated:.0f} % failed"
         if not math.isnan(self.interval[0]):
-            text += f" ({in_points(self.difference, self.interval, ' points')})"
+            text += f" ({format_points(self.difference, self.interval, ' points')})"
         if math.isnan(self.explained):
             return text
         if self.explained <= 0:

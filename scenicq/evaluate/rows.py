@@ -11,7 +11,7 @@ from typing import Any
 from scenicq.evaluate.balance import Balance
 from scenicq.evaluate.benchmark import BenchmarkFigures
 from scenicq.evaluate.classes import ClassFigures
-from scenicq.evaluate.comparison import ShareComparison, in_points, p_text
+from scenicq.evaluate.comparison import ShareComparison, format_points, p_text
 from scenicq.evaluate.controls import PLACES
 from scenicq.evaluate.detection import FoundWithin
 from scenicq.evaluate.evaluation import Evaluation, ModelsEvaluation, ScenarioEvaluation
@@ -146,7 +146,7 @@ def _chance(value: float) -> str:
 
 def _points(each: ShareComparison) -> str:
     """The difference in points, with its interval."""
-    return "-" if math.isnan(each.difference) else in_points(each.difference, each.interval)
+    return "-" if math.isnan(each.difference) else format_points(each.difference, each.interval)
 
 
 def _recordings(each: ShareComparison) -> str:

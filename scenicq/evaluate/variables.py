@@ -38,7 +38,7 @@ _NORMAL = NormalDist()
 
 
 class Draws:
-    """The same draws for all labels, the same in every run.
+    """Random draws that are the same for all labels and in every run.
 
     Attributes:
         count: How many.
@@ -114,7 +114,7 @@ class Draws:
     def _points_of(self, regions: Data) -> Vectors:
         """Points of whichever region each draw has chosen."""
         if not isinstance(regions, Coded) or any(size > 1 for size in regions.which.shape[:-1]):
-            raise CannotEvaluate("a point of a region that hangs on the label")
+            raise CannotEvaluate("a point of a region that depends on the label")
         x, y = np.empty((1, self.count)), np.empty((1, self.count))
         which = np.broadcast_to(regions.which, (1, self.count))
         for number in cast("list[int]", np.unique(which).tolist()):
@@ -172,13 +172,13 @@ def point_density(region: Data, point: Vectors) -> Array:
     """The density of a uniform point of a region at some places.
 
     Raises:
-        CannotEvaluate: The region has no area of its own, such as a line, or hangs on what is hidden.
+        CannotEvaluate: The region has no area of its own, such as a line, or depends on what is hidden.
     """
     if isinstance(region, Placed):
         return np.where(distances(region, *point) <= SLACK, 1 / _area(region), 0.0)
     only = region.options[0] if isinstance(region, Coded) and len(region.options) == 1 else None
     if not isinstance(only, Region):
-        raise CannotEvaluate("a point of what is no region")
+        raise CannotEvaluate("a random point in something that is not a region")
     measured = area(only)
     if not measured:
         raise CannotEvaluate("a point of a region without an area")

@@ -2,7 +2,7 @@
 
 A `Body` is evaluated in columns over rows, one for each label object of each place, and then told for each place, in
 three truth values: what a label object does not observe, and whether one of a coarser class is of the class in
-question, are unknown, and so is what hangs on it.
+question, are unknown, and so is what depends on it.
 """
 
 from __future__ import annotations
@@ -194,7 +194,7 @@ def concatenate(columns: Sequence[Column]) -> Column:
     numbers = [each.data for each in columns if isinstance(each.data, np.ndarray)]
     if len(numbers) == len(columns):
         return Column(whole(numbers), status)
-    raise CannotEvaluate("what is asked of the nearest is of several kinds")
+    raise CannotEvaluate("the value asked of the nearest object has several types")
 
 
 def take_rows(column: Column, rows: NDArray[np.intp], n: int) -> Column:
@@ -218,7 +218,7 @@ def take_rows(column: Column, rows: NDArray[np.intp], n: int) -> Column:
 
 
 def _drawn(_leaf: Leaf, _args: Sequence[Column]) -> Column:
-    raise CannotEvaluate("what is asked of label objects hangs on a random value")
+    raise CannotEvaluate("a condition on label objects depends on a random value")
 
 
 @lru_cache(maxsize=256)

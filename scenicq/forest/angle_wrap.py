@@ -21,7 +21,7 @@ def one_turn(heading: Node) -> Node:
 
 
 def any_turn(heading: Node) -> Node:
-    """The same heading up to full turns, without what `one_turn` does to its parts; what is shared stays shared."""
+    """Undo what `one_turn` does to the parts of a heading, which changes by full turns; what is shared stays shared."""
     known: dict[int, Node] = {}
     todo = [heading]
     while todo:

@@ -135,7 +135,7 @@ def _common(a: Box, b: Box) -> Box:
 
 
 def leaf_boxes(roots: list[tuple[Node, Box]]) -> dict[Identity, Box]:
-    """The same for several expressions and boxes that hold together."""
+    """`point_boxes` for several expressions, each of which lies in its box."""
     boxes: dict[Identity, Box] = {}
     for root, target in roots:
         for identity, box in point_boxes(root, target).items():

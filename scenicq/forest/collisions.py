@@ -8,7 +8,7 @@ from scenicq.forest import build
 from scenicq.forest.nodes import ArithmeticOp, Feature, Intersects, Logic, LogicOp, Node, RectangleAt
 from scenicq.forest.scenario import BuiltIn, Requirement, Scenario
 
-__all__ = ["apart", "boxes"]
+__all__ = ["boxes", "no_overlap"]
 
 _TOUCHING = 1e-4
 """The share of a size by which boxes may overlap: `ahead of ego` puts one box against the other, up to rounding."""
@@ -31,7 +31,7 @@ def _smaller(size: Node) -> Node:
     return build.arithmetic(ArithmeticOp.MUL, size, build.constant(1 - _TOUCHING))
 
 
-def apart(scenario: Scenario, frames: Mapping[int, RectangleAt], first: int, second: int) -> Requirement:
+def no_overlap(scenario: Scenario, frames: Mapping[int, RectangleAt], first: int, second: int) -> Requirement:
     """That two objects do not overlap.
 
     Args:

@@ -31,7 +31,7 @@ from scenicq.forest.columns import (
     common_status,
     constant_column,
     distances,
-    packed,
+    pack_values,
     truth_of,
     value_reader,
 )
@@ -122,7 +122,7 @@ _BINARY: Mapping[ArithmeticOp, Callable[[Array, Array], Array]] = {
 
 @dataclass(frozen=True, slots=True)
 class ColumnDomain:
-    """Values for many places; undefined ones spread, unknown ones hide what hangs on them.
+    """Values for many places; undefined ones spread, unknown ones hide what depends on them.
 
     Attributes:
         observed: The column of a feature.
@@ -387,7 +387,7 @@ class ColumnDomain:
         status[places.defined] = np.array(said, dtype=np.int8)[number] if said else DEFINED
         code = np.zeros(places.count, dtype=np.intp)
         code[places.defined] = number
-        return Column(packed(values, said, code.reshape(places.shape)), status.reshape(places.shape))
+        return Column(pack_values(values, said, code.reshape(places.shape)), status.reshape(places.shape))
 
 
 def _of_points(

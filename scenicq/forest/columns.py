@@ -1,7 +1,7 @@
-"""Columns: what an expression, or something observed, amounts to at many places at once.
+"""Columns: the values of an expression, or of something observed, at many places at once.
 
-A place is a label, a sample or a draw. A column holds a value and a status for each; columns broadcast with one another
-as arrays do, so that what is the same along an axis stands there once.
+A place is a label, a sample or a draw. A column has a value and a status for each place. Columns broadcast with one
+another as arrays do, so a value that is the same along an axis is stored once.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ __all__ = [
     "common_status",
     "constant_column",
     "distances",
-    "packed",
+    "pack_values",
     "truth_of",
     "value_reader",
 ]  # fmt: skip
@@ -43,16 +43,16 @@ Array: TypeAlias = NDArray[Any]
 Vectors: TypeAlias = tuple[Array, Array]
 """The x and y coordinates of vectors."""
 DEFINED, UNDEFINED, UNKNOWN = np.int8(0), np.int8(1), np.int8(2)
-"""Whether there is a value at a place: where several hold of what a value hangs on, the last of them."""
+"""The status of a value at a place. A value that depends on others has the greatest status of these."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Coded:
-    """Values that are neither numbers nor vectors, by their place in a list.
+    """Values that are neither numbers nor vectors, as indices into a list.
 
     Attributes:
-        which: Numbers of options.
-        options: Texts, regions, vector fields, ...
+        which: Indices of options.
+        options: The distinct values: texts, regions, vector fields, ...
     """
 
     which: NDArray[np.intp]
@@ -61,10 +61,10 @@ class Coded:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Placed:
-    """Discs, sectors or rectangles.
+    """Discs, sectors or rectangles, one at each place.
 
     Attributes:
-        node: Which of them.
+        node: A node of the same kind as all of them.
         center: Their centres.
         numbers: Their other parameters, in the order of the node's children.
     """
@@ -75,7 +75,7 @@ class Placed:
 
 
 Data: TypeAlias = "Array | Vectors | Coded | Placed"
-"""Numbers or truth values, the coordinates of vectors, or other values; of no meaning where there is no value."""
+"""Numbers or truth values, the coordinates of vectors, or other values; meaningless where nothing is defined."""
 
 
 class Column(NamedTuple):
@@ -83,7 +83,7 @@ class Column(NamedTuple):
 
     Attributes:
         data: The values.
-        status: Whether they are there: `DEFINED`, `UNDEFINED` or `UNKNOWN`.
+        status: `DEFINED`, `UNDEFINED` or `UNKNOWN`.
     """
 
     data: Data
@@ -91,7 +91,7 @@ class Column(NamedTuple):
 
 
 class ColumnPlaces:
-    """The places of some columns in one row, with what holds at each."""
+    """The places at which several columns are evaluated together, flattened, with their common status."""
 
     def __init__(self, columns: Sequence[Column]) -> None:
         self.shape = np.broadcast_shapes(*(part.shape for each in columns for part in _parts(each)))
@@ -100,7 +100,7 @@ class ColumnPlaces:
         self.defined = np.flatnonzero(self.status == DEFINED)
 
     def spread(self, values: Array) -> Array:
-        """An array of these places."""
+        """Broadcast an array to these places, and flatten it."""
         return np.broadcast_to(values, self.shape).ravel()
 
     def points(self, data: Data) -> NDArray[np.float64]:
@@ -108,7 +108,7 @@ class ColumnPlaces:
         return np.column_stack([self.spread(axis)[self.defined] for axis in cast("tuple[Array, Array]", data)])
 
     def combinations(self, columns: Sequence[Column]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """Defined places with all combinations of arguments, and for each defined place which of them is its own."""
+        """Places with every combination of arguments, and for each defined place the index of its combination."""
         code: Array = np.zeros(len(self.defined), dtype=np.intp)
         for column in columns:
             data = column.data
@@ -121,13 +121,13 @@ class ColumnPlaces:
 
 
 def column_of(values: Sequence[Value]) -> Column:
-    """Values one after the other; None is unknown."""
+    """Make a column of values; None is unknown."""
     said = [UNKNOWN if value is None else UNDEFINED if isinstance(value, Undefined) else DEFINED for value in values]
-    return Column(packed(values, said, np.arange(len(values))), np.array(said, dtype=np.int8))
+    return Column(pack_values(values, said, np.arange(len(values))), np.array(said, dtype=np.int8))
 
 
 def constant_column(value: Value) -> Column:
-    """A value that is the same at all places, shape (1,)."""
+    """Make a column of shape (1,), with one value for all places."""
     status = np.full(1, UNDEFINED if isinstance(value, Undefined) else DEFINED)
     if isinstance(value, bool | float | int):
         return Column(np.array([value]), status)
@@ -137,7 +137,7 @@ def constant_column(value: Value) -> Column:
 
 
 def truth_of(data: Data) -> Array:
-    """Truth values as Python has them: of numbers, texts, ..."""
+    """Whether values count as true in Python."""
     if isinstance(data, np.ndarray):
         return data if data.dtype == np.bool_ else np.not_equal(data, 0)
     if isinstance(data, Coded):
@@ -146,7 +146,7 @@ def truth_of(data: Data) -> Array:
 
 
 def common_status(columns: Sequence[Column]) -> NDArray[np.int8]:
-    """The status of what hangs on all of some columns."""
+    """The status of a value that depends on all of some columns."""
     status = columns[0].status
     for column in columns[1:]:
         status = np.maximum(status, column.status)
@@ -178,7 +178,7 @@ def distances(shape: Placed, x: Array, y: Array) -> Array:
 
 
 def value_reader(data: Data, shape: tuple[int, ...]) -> Callable[[int], Value]:
-    """The value at a place of a row of all."""
+    """A function that gives the value at a place, of all places flattened."""
     arrays = [np.broadcast_to(each, shape).ravel() for each in arrays_of(data)]
     if isinstance(data, Placed):
         node: Node = data.node
@@ -197,8 +197,8 @@ def value_reader(data: Data, shape: tuple[int, ...]) -> Callable[[int], Value]:
     return lambda place: kind(arrays[0][place])
 
 
-def packed(values: Sequence[Value], said: Sequence[np.int8], code: NDArray[np.intp]) -> Data:
-    """Values by their numbers: as arrays, if those that are defined are all numbers, truth values or vectors."""
+def pack_values(values: Sequence[Value], said: Sequence[np.int8], code: NDArray[np.intp]) -> Data:
+    """Make data of values by their indices: arrays if all defined ones are numbers, truth values or vectors."""
     there = [value for value, status in zip(values, said, strict=True) if status == DEFINED]
     if not there:
         return np.full(1, np.nan)

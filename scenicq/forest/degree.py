@@ -28,13 +28,13 @@ def degree(
     variables: Collection[Identity],
     other: Callable[[Node, Sequence[int]], int] = lambda _node, _own: NOT_AFFINE,
 ) -> int:
-    """0 for expressions that do not hang on some variables, 1 for affine ones, whatever the others come out as.
+    """0 for expressions that do not depend on some variables, 1 for affine ones, whatever the others come out as.
 
     Args:
         roots: The expressions; the greatest degree counts.
         variables: The variables.
         other: The degree of a node of another kind than arithmetic, vectors and choices, from those of its children, of
-            which one hangs on a variable.
+            which one depends on a variable.
     """
     known: dict[int, int] = {}
     for node in postorder(roots):

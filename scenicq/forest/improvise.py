@@ -17,7 +17,7 @@ from scenicq.budget import look
 from scenicq.errors import CannotEvaluate
 from scenicq.forest.containment_pruning import shrink_regions
 from scenicq.forest.draw_schedule import DrawSchedule, lay_out
-from scenicq.forest.inline import Check, assemble
+from scenicq.forest.inline import Check, inline_scenario
 from scenicq.forest.nodes import Constant, Encloses, Identity, Undefined, Value
 from scenicq.forest.proximity_pruning import Window, close_points
 from scenicq.forest.scenario import BuiltIn, Scenario
@@ -67,7 +67,7 @@ class Improviser:
             enforce: The built-in requirements in force.
             prune: Whether random points are kept from where conditions exclude them; scenes are the same without.
         """
-        parts = assemble(scenario.as_written or scenario, enforce)
+        parts = inline_scenario(scenario.as_written or scenario, enforce)
         self.checks = parts.checks
         self.rejected: Counter[int] = Counter()
         self.undecided = ""

@@ -1,7 +1,10 @@
-"""A scenario as expressions over random variables alone: what has to be drawn, and what must hold of it.
+"""Rewrite a scenario to expressions over random variables alone: the values of a scene, and what must hold of it.
 
-References to properties are replaced by their definitions, mutation noise is written out, and requirements are split at
-`and`. Built-in requirements see the objects after the noise, all others before (language paper, figure 11).
+- A reference to a property becomes the property's definition.
+- Mutation becomes noise that is added to position and heading.
+- Requirements are split at `and`, so that what rejects a scene is as small as can be.
+
+Built-in requirements see the objects after the noise, all others before it (language paper, figure 11).
 """
 
 from __future__ import annotations
@@ -13,7 +16,7 @@ from dataclasses import dataclass
 from scenicq.errors import CannotEvaluate, Span
 from scenicq.forest import build
 from scenicq.forest.angle_wrap import one_turn
-from scenicq.forest.collisions import apart, boxes
+from scenicq.forest.collisions import boxes, no_overlap
 from scenicq.forest.compute import fold
 from scenicq.forest.condition import condition
 from scenicq.forest.nodes import (
@@ -27,23 +30,24 @@ from scenicq.forest.nodes import (
 from scenicq.forest.scenario import BuiltIn, Requirement, Scenario, ScenarioObject
 from scenicq.forest.walk import children, conjuncts, features, postorder, transform
 
-__all__ = ["Assembled", "Check", "assemble"]
+__all__ = ["Check", "InlinedScenario", "inline_scenario"]
 
-Key = tuple[int, str]
+_PropertyKey = tuple[int, str]
+"""An object's index, and the name of a property."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Check:
-    """Something that must hold of a scene.
+    """A condition that a scene must meet.
 
     Attributes:
-        condition: Over random variables; a truth value, or with `defined` anything.
-        source: What it is part of, to be named in messages.
-        text: What it is, in the words of the program.
-        span: Where the program says it.
-        defined: Whether the condition need only have a value.
-        probability: With which it must hold.
-        built_in: Which built-in requirement it is part of, if any.
+        condition: An expression over random variables that must be true, or with `defined` only have a value.
+        source: Number of the requirement that it is part of, from 0; below 0 for a position or heading of an object.
+        text: The requirement, in the words of the program.
+        span: Where the program states it.
+        defined: Whether it is enough that the condition has a value, whichever it is.
+        probability: The probability with which the condition must hold.
+        built_in: The built-in requirement that it is part of; None for one that the author wrote.
     """
 
     condition: Node
@@ -56,49 +60,50 @@ class Check:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Assembled:
-    """What has to be drawn for a scene, over random variables.
+class InlinedScenario:
+    """A scenario as expressions over random variables.
 
     Attributes:
-        values: The expression of each property of each object, noise included.
-        params: The expressions of the global parameters.
-        checks: What must hold, as few conditions in each as possible.
+        values: The properties of the objects, noise included, by the object's index and the property's name.
+        params: The global parameters, by name.
+        checks: The conditions that a scene must meet, each as small as can be.
     """
 
-    values: Mapping[Key, Node]
+    values: Mapping[_PropertyKey, Node]
     params: Mapping[str, Node]
     checks: tuple[Check, ...]
 
 
-def assemble(scenario: Scenario, enforce: Set[BuiltIn]) -> Assembled:
-    """A scenario's expressions over random variables.
+def inline_scenario(scenario: Scenario, enforce: Set[BuiltIn]) -> InlinedScenario:
+    """Rewrite a scenario to expressions over random variables.
 
     Args:
         scenario: The scenario.
-        enforce: The built-in requirements in force; what the author writes always is.
+        enforce: The built-in requirements that hold; what the author requires always holds.
     """
     definitions = _Definitions()
-    plain = _plain(scenario, definitions)
-    noise = {key: node for owner in scenario.objects if owner.mutated for key, node in _noise(owner, plain)}
-    before, after = definitions.into, definitions.into_with(noise) if noise else definitions.into
-    params = {name: before(given.value) for name, given in scenario.params.items()}
+    plain = _inline_properties(scenario, definitions)
+    noisy = {key: node for owner in scenario.objects if owner.mutated for key, node in _add_noise(owner, plain)}
+    inline = definitions.inline
+    inline_noisy = definitions.inliner_with(noisy) if noisy else inline
+    params = {name: inline(param.value) for name, param in scenario.params.items()}
     checks: list[Check] = []
     for owner in scenario.objects:
         for name in ("position", "heading"):
-            given = owner.properties[name]
-            span = given.span if given.explicit else owner.span
+            definition = owner.properties[name]
+            span = definition.span if definition.explicit else owner.span
             text = f"the {name} of `{owner.name}`"
             checks.append(Check(plain[owner.index, name], -1 - owner.index, text, span, defined=True))
     for number, each in enumerate(_requirements(scenario, enforce)):
-        into = before if each.built_in is None else after
-        text = _told(scenario, each)
-        # a library's default says nothing to the author: the object is to blame
+        inlined = inline(each.condition) if each.built_in is None else inline_noisy(each.condition)
+        text = _requirement_text(scenario, each)
+        # the library's line of a default says nothing to the author: blame the object
         span = each.span if each.built_in is None else scenario.objects[each.objects[-1]].span
         checks += (
             Check(part, number, text, span, probability=each.probability, built_in=each.built_in)
-            for part in conjuncts(into(each.condition))
+            for part in conjuncts(inlined)
         )
-    return Assembled(plain | noise, params, tuple(checks))
+    return InlinedScenario(plain | noisy, params, tuple(checks))
 
 
 def _requirements(scenario: Scenario, enforce: Set[BuiltIn]) -> Iterator[Requirement]:
@@ -108,10 +113,10 @@ def _requirements(scenario: Scenario, enforce: Set[BuiltIn]) -> Iterator[Require
     if BuiltIn.COLLISION in enforce:
         frames = boxes(scenario)
         for first, second in itertools.combinations(scenario.solid, 2):
-            yield apart(scenario, frames, first, second)
+            yield no_overlap(scenario, frames, first, second)
 
 
-def _told(scenario: Scenario, requirement: Requirement) -> str:
+def _requirement_text(scenario: Scenario, requirement: Requirement) -> str:
     if requirement.built_in is not None:
         names = " and ".join(f"`{scenario.objects[index].name}`" for index in requirement.objects)
         return f"the {requirement.built_in.value} of {names}"
@@ -119,38 +124,40 @@ def _told(scenario: Scenario, requirement: Requirement) -> str:
 
 
 class _Definitions:
-    """Properties by their expressions over random variables; what is shared stays shared."""
+    """The properties of a scenario as expressions over random variables; what expressions share stays shared."""
 
     def __init__(self) -> None:
-        self.found: dict[Key, Node] = {}
+        self.inlined: dict[_PropertyKey, Node] = {}
         self._memo: dict[int, Node] = {}
-        # the memo goes by identity: what it knows must stay alive
+        # the memo goes by identity, so the nodes that it knows must stay alive
         self._originals: list[Node] = []
 
-    def into(self, root: Node) -> Node:
-        """The expression with definitions in place of references."""
+    def inline(self, root: Node) -> Node:
+        """Put the definitions in place of references."""
         self._originals.append(root)
-        return transform(root, lambda node: _step(node, self.found), self._memo)
+        return transform(root, lambda node: _inline_node(node, self.inlined), self._memo)
 
-    def into_with(self, others: Mapping[Key, Node]) -> Callable[[Node], Node]:
-        """The same, but with other definitions of some properties."""
+    def inliner_with(self, replacements: Mapping[_PropertyKey, Node]) -> Callable[[Node], Node]:
+        """A function like `inline` that takes other definitions of some properties."""
 
-        def into(root: Node) -> Node:
-            self.into(root)
+        def inline(root: Node) -> Node:
+            self.inline(root)
+            # what refers to none of these properties is shared with the plain expression
             memo: dict[int, Node] = {}
             changed: set[int] = set()
             for node in postorder((root,)):
-                refers = isinstance(node, Feature) and (node.object, node.property) in others
+                refers = isinstance(node, Feature) and (node.object, node.property) in replacements
                 if refers or any(id(child) in changed for child in children(node)):
                     changed.add(id(node))
                 else:
                     memo[id(node)] = self._memo[id(node)]
-            return transform(root, lambda node: _step(node, others), memo)
+            return transform(root, lambda node: _inline_node(node, replacements), memo)
 
-        return into
+        return inline
 
 
-def _step(node: Node, definitions: Mapping[Key, Node]) -> Node:
+def _inline_node(node: Node, definitions: Mapping[_PropertyKey, Node]) -> Node:
+    """A node whose children are inlined: its definition if it is a reference, its value if it is constant."""
     if isinstance(node, Feature):
         return definitions.get((node.object, node.property), node)
     if isinstance(node, DirectionAt) and all(isinstance(child, Constant) for child in children(node)):
@@ -161,29 +168,29 @@ def _step(node: Node, definitions: Mapping[Key, Node]) -> Node:
         return node
 
 
-def _plain(scenario: Scenario, definitions: _Definitions) -> dict[Key, Node]:
-    """The expression of each property, without noise; those that others refer to come first."""
-    given = {
+def _inline_properties(scenario: Scenario, definitions: _Definitions) -> dict[_PropertyKey, Node]:
+    """The expression of each property, without noise; properties that others refer to are inlined first."""
+    written = {
         (owner.index, name): one_turn(each.value) if name == "heading" and scenario.version == 3 else each.value
         for owner in scenario.objects
         for name, each in owner.properties.items()
     }
-    found = definitions.found
-    todo = list(reversed(given))
+    inlined = definitions.inlined
+    todo = list(reversed(written))
     while todo:
         key = todo[-1]
-        missing = [each for each in features(given[key]) if each not in found and each in given]
-        if key in found or not missing:
-            if key not in found:
-                found[key] = definitions.into(given[key])
+        missing = [each for each in features(written[key]) if each not in inlined and each in written]
+        if key in inlined or not missing:
+            if key not in inlined:
+                inlined[key] = definitions.inline(written[key])
             todo.pop()
         else:
             todo += sorted(missing)
-    return {key: found[key] for key in given}
+    return {key: inlined[key] for key in written}
 
 
-def _noise(owner: ScenarioObject, plain: Mapping[Key, Node]) -> Iterator[tuple[Key, Node]]:
-    """Position and heading of a mutated object with the noise added (language paper, section 4.2)."""
+def _add_noise(owner: ScenarioObject, plain: Mapping[_PropertyKey, Node]) -> Iterator[tuple[_PropertyKey, Node]]:
+    """Add the noise of mutation to an object's position and heading (language paper, section 4.2)."""
     scale = plain[owner.index, "mutationScale"]
 
     def deviation(name: str) -> Node:

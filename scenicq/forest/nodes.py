@@ -529,7 +529,7 @@ IDENTITY, TRACK, RANK = "#id", "#track", "#rank"
 """Properties of whoever plays an object, as numbers: who it is, where it is observed; who it is, wherever it is; its
 place among the ids of its label."""
 OPEN = "#open"
-"""A truth value that no label object has: what hangs on it is unknown."""
+"""A truth value that no label object has: what depends on it is unknown."""
 WHO = frozenset({IDENTITY, TRACK, RANK})
 """All of these: what is known of whoever plays a role, whatever a label observes of it."""
 
@@ -561,7 +561,7 @@ class Body:
 
     @property
     def parts(self) -> tuple[Node, ...]:
-        """Those of the three that there are."""
+        """Condition, distance and value, as far as there are any."""
         return tuple(each for each in (self.condition, self.distance, self.value) if each is not None)
 
 

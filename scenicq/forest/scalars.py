@@ -78,7 +78,7 @@ def compare(op: CompareOp, left: Value, right: Value) -> bool:
 
 
 def connect(op: LogicOp, args: Sequence[Value]) -> Value:
-    """The value of a connective: true or false where that does not hang on what is undefined."""
+    """The value of a connective: true or false where that does not depend on what is undefined."""
     if op is LogicOp.NOT:
         return args[0] if isinstance(args[0], Undefined) else not args[0]
     decisive = op is LogicOp.OR

@@ -102,7 +102,7 @@ def _read(index: Node) -> StepCount | None:
 
 
 def _is_finite(length: Node) -> bool:
-    """Whether a distance hangs on finite choices alone: with these made, it is known, and so is its number of steps."""
+    """Whether a distance depends on finite choices alone: they make it known, and so its number of steps."""
     return all(isinstance(leaf, Index | DiscreteRange) for leaf in leaves(length))
 
 

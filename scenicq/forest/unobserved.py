@@ -193,7 +193,7 @@ class _Reader:
         return found[id(root)]
 
     def _one(self, node: Node, found: dict[int, Truths], reading: set[int], selects: int) -> Truths:
-        """The same of a node that reads what is not observed, after those below it."""
+        """The truths of a node that reads what is not observed, from those of the nodes below it."""
         match node:
             case Among(kind="boolean") if self._unobserved(node) and not all(
                 isinstance(each, Constant) for each in node.inputs
@@ -220,7 +220,7 @@ class _Reader:
     def _of_extreme(
         self, op: CompareOp, extreme: Arithmetic, bound: Node, span: Span | None, selects: int
     ) -> Truths:  # fmt: skip
-        """The same of `min(a, b) < c` and its like: one operand, or each, is beyond; `==` is both ways."""
+        """The truths of `min(a, b) < c` and its like: one operand, or each, is beyond; `==` is both ways."""
         if op not in MIRRORED:
             sides = (self._of_extreme(each, extreme, bound, span, selects) for each in (CompareOp.LE, CompareOp.GE))
             same = join(LogicOp.AND, *sides)
@@ -230,7 +230,7 @@ class _Reader:
         return join(LogicOp.OR if least is below else LogicOp.AND, *parts)
 
     def _atom(self, node: Node, reading: set[int], selects: int) -> Truths:
-        """The same of a condition on values: what is the same for all outcomes of a choice inside is known."""
+        """The truths of a condition on values: what is equal for all outcomes of a choice inside is known."""
         inside = (each for each in postorder((node,)) if isinstance(each, Select) and each is not node)
         choice = next((each for each in inside if id(each) in reading), None)
         if choice is None or selects == 0:
@@ -262,7 +262,7 @@ def _chosen(node: Select, found: dict[int, Truths], *, index_known: bool) -> Tru
 
 
 def _of_speed(node: Node, reading: set[int]) -> Truths:
-    """The same of a comparison with a speed, which is never negative; nothing is known of anything else."""
+    """The truths of a comparison with a speed, which is never negative; nothing is known of anything else."""
     match node:
         case Compare(left=Feature(property="speed") as speed, right=bound) if id(bound) not in reading:
             op = node.op

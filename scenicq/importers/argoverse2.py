@@ -18,15 +18,15 @@ from typing import Any
 
 from scenicq.importers.argoverse2_cameras import POSE, calibration_of, check_pose, nearest, views_of
 from scenicq.importers.argoverse2_map import read_archive
-from scenicq.importers.base import ClassNames, OpenedSource, Options, read_maps
+from scenicq.importers.base import ClassNames, ImportOptions, OpenedSource, read_maps
 from scenicq.importers.by_file import RecordingFiles, by_file_source, missing, take_map
 from scenicq.importers.columnar import read_feather
 from scenicq.importers.fields import InvalidError
 from scenicq.importers.folders import first_files, readable
 from scenicq.importers.layouts import ARGOVERSE2_FILES, argoverse2_logs
-from scenicq.importers.motion import Rigid, quaternion, velocities
+from scenicq.importers.motion import RigidTransform, pose_of_quaternion, velocities
 from scenicq.importers.report import Report
-from scenicq.importers.specification import specification
+from scenicq.importers.specification import load_specification
 from scenicq.store.classes import taxonomy
 from scenicq.store.labels import Label, LabelObject, OutOfPlane
 
@@ -57,7 +57,7 @@ class Argoverse2:
         """Whether the path is a log, or a folder of them, or one of the official folders above."""
         return bool(argoverse2_logs(path))
 
-    def read(self, path: Path, options: Options, report: Report) -> OpenedSource:
+    def read(self, path: Path, options: ImportOptions, report: Report) -> OpenedSource:
         """Open logs; each is read when it is its turn, so memory is that of the largest and of the maps.
 
         Raises:
@@ -68,7 +68,7 @@ class Argoverse2:
             raise missing(path, "no log with `annotations.feather`")
         beside = {folder for above in {log.parent for log in logs if log != path} for folder in above.iterdir()}
         bare = [folder for folder in beside - {*logs} if (folder / _POSES).is_file()]
-        report.not_read(f"log without {_BOXES}", len(bare))
+        report.count_unread(f"log without {_BOXES}", len(bare))
         maps = read_maps(options.maps, report)
         for log in logs:
             if (file := archive_of(log / "map")) is not None:
@@ -129,7 +129,7 @@ class _Log:
         self._report = report
         self._boxes: defaultdict[int, list[_Box]] = defaultdict(list)
         self._tracks: defaultdict[str, list[tuple[int, float, float]]] = defaultdict(list)
-        self._known = specification("argoverse2")
+        self._known = load_specification("argoverse2")
         self._known.count_files(_files(log), report)
         rows = read_feather(
             log / _BOXES, _BOX, {"num_interior_pts": "integer"}, count=self._known.column_counter(_BOXES, report)
@@ -139,7 +139,7 @@ class _Log:
             try:
                 self._add({key: values[number] for key, values in rows.items()})
             except InvalidError as error:
-                report.left_out("object", "record-invalid", f"{log.name}/{_BOXES}:{number + 1}: {error}")
+                report.leave_out("object", "record-invalid", f"{log.name}/{_BOXES}:{number + 1}: {error}")
 
     def labels(self) -> list[Label]:
         times = sorted(self._poses)
@@ -148,7 +148,7 @@ class _Log:
         params: dict[str, str | float | bool] = {"location": parts[0].partition("_")[0]} if parts else {}
         images = self._images()
         views = views_of(self._log, times, images, self._report)
-        places = [self._poses[time].place((_AXLE_TO_CENTRE_M, 0.0, 0.0)) for time in times]
+        places = [self._poses[time].transform_point((_AXLE_TO_CENTRE_M, 0.0, 0.0)) for time in times]
         centres = [(time // 1000, x, y) for time, (x, y, _) in zip(times, places, strict=True)]
         ego_moves = _moves(centres)
         moves = {
@@ -188,23 +188,23 @@ class _Log:
             out_of_plane=box.out_of_plane,
         )
 
-    def _read_poses(self, wanted: set[int]) -> dict[int, Rigid]:
+    def _read_poses(self, wanted: set[int]) -> dict[int, RigidTransform]:
         rows = read_feather(
             self._log / _POSES,
             {"timestamp_ns": "integer", **POSE},
             count=self._known.column_counter(_POSES, self._report),
         )
-        poses: dict[int, Rigid] = {}
+        poses: dict[int, RigidTransform] = {}
         for number, time in enumerate(rows["timestamp_ns"]):
             if time in wanted and time not in poses:
                 try:
                     poses[time] = _pose({key: values[number] for key, values in rows.items()})
                 except InvalidError as error:
                     place = f"{self._log.name}/{_POSES}:{number + 1}"
-                    self._report.left_out("ego pose", "record-invalid", f"{place}: {error}")
+                    self._report.leave_out("ego pose", "record-invalid", f"{place}: {error}")
         for time in sorted(wanted - set(poses)):
             message = f"{self._log.name}: annotations at {time} have no sound pose of the ego"
-            self._report.left_out("label", "record-invalid", message)
+            self._report.leave_out("label", "record-invalid", message)
         return poses
 
     def _add(self, row: Mapping[str, Any]) -> None:
@@ -216,7 +216,7 @@ class _Log:
         size = row["width_m"], row["length_m"], row["height_m"]
         if not all(value is not None and 0 < value < math.inf for value in size):
             raise InvalidError("its size is not positive")
-        box = self._poses[time].then(_pose(row))
+        box = self._poses[time].compose(_pose(row))
         x, y, z = box.origin
         space = OutOfPlane(z, box.pitch, box.roll)
         points = row.get("num_interior_pts")
@@ -255,7 +255,7 @@ def _moves(places: Sequence[tuple[int, float, float]]) -> list[tuple[float, floa
     return velocities(places, reach_us=_REACH_US, longest_us=_LONGEST_STEP_US)
 
 
-def _ego(place: tuple[float, float, float], pose: Rigid, velocity: tuple[float, float] | None) -> LabelObject:
+def _ego(place: tuple[float, float, float], pose: RigidTransform, velocity: tuple[float, float] | None) -> LabelObject:
     width, length, height = _EGO_SIZE_M
     return LabelObject(
         "ego", "Car", _EGO_CLASS, place[0], place[1], pose.heading, width, length, height, velocity,
@@ -263,6 +263,6 @@ def _ego(place: tuple[float, float, float], pose: Rigid, velocity: tuple[float, 
     )  # fmt: skip
 
 
-def _pose(row: Mapping[str, Any]) -> Rigid:
+def _pose(row: Mapping[str, Any]) -> RigidTransform:
     check_pose(row)
-    return quaternion(row["qw"], row["qx"], row["qy"], row["qz"], (row["tx_m"], row["ty_m"], row["tz_m"]))
+    return pose_of_quaternion(row["qw"], row["qx"], row["qy"], row["qz"], (row["tx_m"], row["ty_m"], row["tz_m"]))

@@ -10,13 +10,13 @@ from typing import Any
 
 from scenicq.errors import DataError
 from scenicq.geometry.camera import Camera
-from scenicq.importers.cameras import Mount, Pose, pose_of, posed
+from scenicq.importers.cameras import Mount, Pose, place_camera, pose_of
 from scenicq.importers.columnar import read_feather
 from scenicq.importers.fields import InvalidError
 from scenicq.importers.folders import readable
 from scenicq.importers.layouts import ARGOVERSE2_FILES
 from scenicq.importers.report import Report
-from scenicq.importers.specification import specification
+from scenicq.importers.specification import load_specification
 
 __all__ = ["POSE", "Images", "calibration_of", "check_pose", "nearest", "views_of"]
 
@@ -38,12 +38,12 @@ def views_of(log: Path, times: Sequence[int], images: Images, report: Report) ->
     Args:
         log: Folder of the log.
         times: Nanoseconds.
-        images: Of each camera; the nearest in time counts.
+        images: The images of each camera; the nearest in time counts.
         report: Takes what is unsound; a calibration that cannot be read counts as none.
     """
 
     def tell(problem: str) -> None:
-        report.left_out("camera", "record-invalid", f"{log.name}/{problem}")
+        report.leave_out("camera", "record-invalid", f"{log.name}/{problem}")
 
     views: dict[int, dict[str, Camera]] = {time: {} for time in times}
     mounts = _mounts(calibration_of(log), tell, report) if any(images.values()) else {}
@@ -58,7 +58,7 @@ def views_of(log: Path, times: Sequence[int], images: Images, report: Report) ->
         mount, size = mounts[name]
         if taken in vehicles:
             try:
-                views[time][readable(name)] = posed(mount, vehicles[taken], *size)
+                views[time][readable(name)] = place_camera(mount, vehicles[taken], *size)
             except InvalidError as error:
                 tell(f"calibration: `{name}` at {taken}: {error}")
     return views
@@ -118,7 +118,7 @@ def _mounts(
 
 def _read(file: Path, columns: Mapping[str, str], report: Report) -> dict[str, Any]:
     """Columns of a file of the calibration; what is not read is counted."""
-    counter = specification("argoverse2").column_counter(f"calibration/{file.name}", report)
+    counter = load_specification("argoverse2").column_counter(f"calibration/{file.name}", report)
     return read_feather(file, columns, count=counter)
 
 

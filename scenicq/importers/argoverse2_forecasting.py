@@ -13,7 +13,7 @@ from typing import Any
 from scenicq.errors import DataError, Diagnostic
 from scenicq.importers.argoverse2 import archive_of
 from scenicq.importers.argoverse2_map import read_archive
-from scenicq.importers.base import ClassNames, OpenedSource, Options, read_maps
+from scenicq.importers.base import ClassNames, ImportOptions, OpenedSource, read_maps
 from scenicq.importers.by_file import RecordingFiles, by_file_source, missing, take_map
 from scenicq.importers.columnar import read_parquet
 from scenicq.importers.fields import InvalidError
@@ -21,7 +21,7 @@ from scenicq.importers.layouts import argoverse2_scenarios
 from scenicq.importers.motion import heading_of_yaw
 from scenicq.importers.recording_checks import radians
 from scenicq.importers.report import Report
-from scenicq.importers.specification import specification
+from scenicq.importers.specification import load_specification
 from scenicq.store.classes import taxonomy
 from scenicq.store.labels import Label, LabelObject
 
@@ -46,7 +46,7 @@ class Argoverse2Forecasting:
         """Whether the path is a scenario's folder, or one that holds them at up to two levels."""
         return bool(argoverse2_scenarios(path))
 
-    def read(self, path: Path, options: Options, report: Report) -> OpenedSource:
+    def read(self, path: Path, options: ImportOptions, report: Report) -> OpenedSource:
         """Open scenarios; each is a recording.
 
         Raises:
@@ -77,7 +77,7 @@ def _name(file: Path) -> str:
 
 def _read_scenario(place: RecordingFiles, classes: ClassNames, report: Report) -> list[tuple[Label, str]]:
     file = place.files[0]
-    known = specification("argoverse2-forecasting")
+    known = load_specification("argoverse2-forecasting")
     known.count_files((each.name for each in file.parent.iterdir()), report)
     rows = read_parquet(file, _COLUMNS, _OPTIONAL, count=known.column_counter(_TABLE, report))
     steps: dict[int, list[LabelObject]] = {}
@@ -88,7 +88,7 @@ def _read_scenario(place: RecordingFiles, classes: ClassNames, report: Report) -
                 raise InvalidError("`timestep` is missing")
             steps.setdefault(row["timestep"], []).append(_object(row, classes, report))
         except InvalidError as error:
-            report.left_out("object", "record-invalid", f"{file.name}:{number + 1}: {error}")
+            report.leave_out("object", "record-invalid", f"{file.name}:{number + 1}: {error}")
     if not steps:
         raise DataError(Diagnostic("file-invalid", f"{file} has no sound row"))
     params: dict[str, str | float | bool] = {"location": city} if (city := _only(rows, "city")) else {}
@@ -96,7 +96,7 @@ def _read_scenario(place: RecordingFiles, classes: ClassNames, report: Report) -
     for step in sorted(steps):
         ego = next((member for member in steps[step] if member.id == "ego"), None)
         if ego is None:
-            report.left_out("label", "record-invalid", f"{file.name}: step {step} has no track `{_EGO_TRACK}`")
+            report.leave_out("label", "record-invalid", f"{file.name}: step {step} has no track `{_EGO_TRACK}`")
             continue
         others = tuple(member for member in steps[step] if member is not ego)
         made.append(

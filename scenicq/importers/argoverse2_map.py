@@ -20,7 +20,7 @@ from scenicq.importers import fields
 from scenicq.importers.fields import InvalidError, Record
 from scenicq.importers.lane_graph import BoundedLane, Points, lane_features, sound_area
 from scenicq.importers.report import Report
-from scenicq.importers.specification import specification
+from scenicq.importers.specification import load_specification
 
 __all__ = ["read_archive"]
 
@@ -42,7 +42,7 @@ def read_archive(path: Path, on_problem: ProblemSink, report: Report) -> tuple[M
         if path.stat().st_size > _LARGEST_BYTES:
             raise InvalidError("larger than a map is")
         content = fields.record(fields.parse_json(path.read_bytes()), "the map")
-        specification("argoverse2-map").count_json(content, report)
+        load_specification("argoverse2-map").count_json(content, report)
         lanes = list(_each(content, "lane_segments", _lane, on_problem))
         areas = [
             *_each(content, "pedestrian_crossings", _crossing, on_problem),

@@ -1,8 +1,8 @@
-"""What an importer is, and what all importers share: options, classes, maps, checks of labels.
+"""The interface of importers, and what all of them share: options, class names, maps, checks of labels.
 
-An importer knows one dataset format. It yields columns, or plain labels that become columns, in the conventions of
-`scenicq.store.labels`; everything else (columns computed from the map, files, checksums) is the store's. Read next:
-`interchange.py`.
+An importer knows one dataset format. It makes columns of labels, or plain labels that become columns, in the
+conventions of `scenicq.store.labels`. Everything else is the store's: columns computed from the map, files, checksums.
+Read next: `interchange.py`, an example.
 """
 
 from __future__ import annotations
@@ -29,26 +29,26 @@ if TYPE_CHECKING:
 
 __all__ = [
     "ClassNames",
-    "Entry",
+    "ImportOptions",
     "Importer",
-    "Labels",
+    "LabelChecker",
     "OpenedSource",
-    "Options",
-    "Reader",
+    "RecordingEntry",
+    "RecordingReader",
     "read_class_map",
     "read_maps",
 ]
 
 
 @dataclass(frozen=True, slots=True)
-class Options:
+class ImportOptions:
     """What the user may tell every importer.
 
     Attributes:
-        maps: GeoJSON file of each map, in addition to and before those of the source.
-        class_map: Class of the tree for class names of the source, before the source's own taxonomy.
-        ego: For sources that have no ego: the track that is to be it, "nearest" (in each frame the vehicle nearest to
-            the middle of all objects) or "none"; None is "nearest", and is told.
+        maps: GeoJSON files by the names of maps. They add to the source's maps; of one name, this file counts.
+        class_map: Classes of the tree by class names of the source; these count before the source's own taxonomy.
+        ego: Which track becomes the ego of a source that has none, "nearest" (in each frame, the vehicle nearest to the
+            middle of all objects) or "none". None stands for "nearest" and is reported.
         scratch: Folder for temporary files that must outlive `Importer.read`; its owner removes it.
     """
 
@@ -59,13 +59,13 @@ class Options:
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
-    """A recording of a source that is opened but not read.
+class RecordingEntry:
+    """A recording that a source lists, before it is read.
 
     Attributes:
-        name: Unique in the source.
-        weight: About how many label objects it has.
-        digest: Changes with what the source says of it.
+        name: Name of the recording, unique in the source.
+        weight: Estimate of how many label objects it has.
+        digest: Checksum that changes with what the source says of the recording.
     """
 
     name: str
@@ -73,44 +73,44 @@ class Entry:
     digest: str
 
 
-class Reader(Protocol):
-    """Reads some recordings, perhaps in another process: it must be possible to pickle it."""
+class RecordingReader(Protocol):
+    """Reads some recordings of a source; pickled, because it may run in another process."""
 
-    def recordings(self, labels: Labels, report: Report) -> Iterator[RecordingColumns]:
+    def recordings(self, labels: LabelChecker, report: Report) -> Iterator[RecordingColumns]:
         """The recordings in order of their names, each with at least one label.
 
         Args:
-            labels: Checks what must hold between labels.
-            report: Takes what is unsound.
+            labels: Checks labels, also against each other.
+            report: Collects what is unsound.
         """
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class OpenedSource:
-    """An opened source.
+    """A source whose maps and list of recordings have been read, but no recording.
 
     Attributes:
         name: What the source calls itself.
-        maps: Elements of each map.
+        maps: Map elements, by the names of maps.
         entries: The recordings in order of their names.
-        reader: Gives a reader of some of the recordings, by name.
-        frames: Number of labels that the source claims, for progress only.
-        context: Changes with everything but maps and recordings that the dataset depends on.
-        facts: What the dataset's provenance should say of how values were made.
+        reader: Makes a reader of some recordings, by their names.
+        frames: Number of labels that the source claims to have, for progress alone.
+        context: Checksum of all that labels depend on besides maps and recordings, such as a class map.
+        facts: How values were made, for the provenance of the dataset.
     """
 
     name: str
     maps: Mapping[str, tuple[MapFeature, ...]]
-    entries: tuple[Entry, ...]
-    reader: Callable[[Sequence[str]], Reader]
+    entries: tuple[RecordingEntry, ...]
+    reader: Callable[[Sequence[str]], RecordingReader]
     frames: int
     context: str = ""
     facts: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
     def recordings(self, report: Report) -> Iterator[RecordingColumns]:
-        """All recordings, one after the other."""
-        return self.reader([entry.name for entry in self.entries]).recordings(Labels(self.maps, report), report)
+        """Read all recordings, one after the other."""
+        return self.reader([entry.name for entry in self.entries]).recordings(LabelChecker(self.maps, report), report)
 
 
 class Importer(Protocol):
@@ -118,25 +118,25 @@ class Importer(Protocol):
 
     @property
     def name(self) -> str:
-        """What `--format` calls it, one word in lower case."""
+        """The name for `--format`, one word in lower case."""
         ...
 
     @property
     def layout(self) -> str:
-        """The files by which it recognises a source, for messages."""
+        """The files by which a source is recognised, for messages."""
         ...
 
     def recognises(self, path: Path) -> bool:
-        """Whether a source is of this format: cheap, and True for no source of another format."""
+        """Whether a source is of this format; must be cheap, and False for every source of another format."""
         ...
 
-    def read(self, path: Path, options: Options, report: Report) -> OpenedSource:
+    def read(self, path: Path, options: ImportOptions, report: Report) -> OpenedSource:
         """Open a source.
 
-        What is unsound goes to the report and is left out; a source that cannot be read at all is an error.
+        What is unsound is left out and reported; a source that cannot be read at all is an error.
 
         Raises:
-            DataError: `file-missing`, `file-invalid`; with a strict report whatever is unsound.
+            DataError: `file-missing` or `file-invalid`; with a strict report, the code of whatever is unsound.
         """
         ...
 
@@ -145,137 +145,142 @@ class ClassNames:
     """Translates class names of a source into the class tree.
 
     Attributes:
-        known: Class of the tree for each name.
+        known: Classes of the tree by the source's names.
     """
 
     def __init__(self, known: Mapping[str, str], report: Report) -> None:
-        """Take the names that are known: the source's taxonomy and, before it, the user's class map."""
+        """Take the source's taxonomy, in which the user's class map has replaced what it names."""
         self.known = known
         self._report = report
 
     def category(self, name: str) -> str:
-        """The class of the tree; `Object`, reported, for a name that nothing lists."""
+        """The class of the tree; for an unknown name it is `Object`, which is reported."""
         if (category := self.known.get(name)) is not None:
             return category
         message = f"class `{name}` is in no taxonomy; its objects become `{ROOT}`"
         near = similar(name.capitalize(), subclasses(ROOT))
-        meant = f'"{near}"' if near else "CLASS"
-        hint = f'a class map with {{"{name}": {meant}}} gives it a class: `--class-map FILE`'
-        self._report.kept("object", "unknown-class", message, name=name, hints=(hint,))
+        suggestion = f'"{near}"' if near else "CLASS"
+        hint = f'a class map with {{"{name}": {suggestion}}} gives it a class: `--class-map FILE`'
+        self._report.keep("object", "unknown-class", message, name=name, hints=(hint,))
         return ROOT
 
 
-class Labels:
-    """Checks what must hold between labels of a source; each check that fails leaves something out and is reported."""
+class LabelChecker:
+    """Keeps the sound labels of a source.
+
+    A label is sound if its values are possible, no earlier label of the source has its id, and none of its recording
+    has its time. What is not sound is left out and reported: whole labels, or objects and sensor files of a label.
+    """
 
     def __init__(self, maps: Collection[str], report: Report, taken: Collection[tuple[str, str]] = frozenset()) -> None:
         """Start without labels.
 
         Args:
-            maps: Names of the maps; any other is missing.
-            report: Takes what is left out.
-            taken: Recording and frame of labels whose name a label of an earlier recording has.
+            maps: Names of the maps that there are.
+            report: Collects what is left out.
+            taken: Recordings and ids of labels whose id an earlier recording has, where those of all are known before.
         """
         self._maps = maps
         self._report = report
         self._taken = taken
         self._frames: set[str] = set()
 
-    def recording(self, name: str, labels: Sequence[tuple[Label, str]]) -> RecordingColumns | None:
-        """What `sound` makes of plain labels.
+    def check_labels(self, name: str, labels: Sequence[tuple[Label, str]]) -> RecordingColumns | None:
+        """Keep the sound labels of a recording; as `check_columns`, for plain labels.
 
         Args:
             name: The name of the recording.
-            labels: Each with its place in the source, for messages.
+            labels: Labels in any order, each with its file and line in the source, for messages.
         """
-        made = [label for label, _ in labels]
-        found = columns_of(Recording(name, made[0].map if made else "", tuple(made)))
-        return self.sound(found, [place for _, place in labels], [label.map for label in made])
+        plain = [label for label, _ in labels]
+        columns = columns_of(Recording(name, plain[0].map if plain else "", tuple(plain)))
+        return self.check_columns(columns, [source_line for _, source_line in labels], [label.map for label in plain])
 
-    def sound(
-        self, found: RecordingColumns, places: Sequence[object], maps: Sequence[str] | None = None
+    def check_columns(
+        self, columns: RecordingColumns, source_lines: Sequence[object], maps: Sequence[str] | None = None
     ) -> RecordingColumns | None:
-        """The sound labels of a recording, sorted; None if there is none.
+        """Keep the sound labels of a recording, sorted by time; None if there is none.
 
         Args:
-            found: Its labels in any order.
-            places: Where each label is in the source, for messages; a text is made only of what is told.
+            columns: The labels in any order.
+            source_lines: File and line of each label in the source, for messages; `str` is called for reported ones.
             maps: The map of each label, if they may differ.
         """
-        problems = find_problems(found)
+        problems = find_problems(columns)
         order: list[int] = []
         times: dict[int, str] = {}
-        for number, (frame, time) in enumerate(zip(found.frames, found.times_us, strict=True)):
-            if frame in self._frames or (found.name, frame) in self._taken:
-                self._leave_out(f"{places[number]}: label id `{frame}` is used twice")
-            elif maps is not None and maps[number] != found.map:
-                message = f"label `{frame}` has map `{maps[number]}`, its recording began with `{found.map}`"
-                self._leave_out(f"{places[number]}: {message}")
+        for number, (frame, time) in enumerate(zip(columns.frames, columns.times_us, strict=True)):
+            if frame in self._frames or (columns.name, frame) in self._taken:
+                self._leave_out(f"{source_lines[number]}: label id `{frame}` is used twice")
+            elif maps is not None and maps[number] != columns.map:
+                message = f"label `{frame}` has map `{maps[number]}`, its recording began with `{columns.map}`"
+                self._leave_out(f"{source_lines[number]}: {message}")
             elif time in times:
                 message = f"label `{frame}` has the time of label `{times[time]}`"
-                self._leave_out(f"{places[number]}: {message} in recording `{found.name}`")
+                self._leave_out(f"{source_lines[number]}: {message} in recording `{columns.name}`")
             elif number in problems.labels:
-                self._leave_out(f"{places[number]}: label `{frame}` or its ego: {problems.labels[number]}")
+                self._leave_out(f"{source_lines[number]}: label `{frame}` or its ego: {problems.labels[number]}")
             else:
                 self._frames.add(frame)
                 times[time] = frame
                 order.append(number)
         if not order:
-            self._report.left_out("recording", "record-invalid", f"recording `{found.name}` has no sound label")
+            self._report.leave_out("recording", "record-invalid", f"recording `{columns.name}` has no sound label")
             return None
-        if found.map not in self._maps:
-            self._tell_missing(found.map, len(order))
-        objects, sensors = self._sound_rows(found, problems, places, order)
-        order.sort(key=lambda number: (found.times_us[number], found.frames[number]))
-        as_it_is = order == list(range(len(found.frames)))
-        if as_it_is and objects.all() and sensors.all():
-            return found
-        return take_labels(found, order, objects, sensors)
+        if columns.map not in self._maps:
+            self._report_missing_map(columns.map, len(order))
+        objects, sensors = self._sound_rows(columns, problems, source_lines, order)
+        order.sort(key=lambda number: (columns.times_us[number], columns.frames[number]))
+        unchanged = order == list(range(len(columns.frames)))
+        if unchanged and objects.all() and sensors.all():
+            return columns
+        return take_labels(columns, order, objects, sensors)
 
-    def _tell_missing(self, map_name: str, labels: int) -> None:
+    def _report_missing_map(self, map_name: str, label_count: int) -> None:
         if map_name == NO_MAP:
             message = "labels have no map: no road, lane or direction of traffic is known for them"
-            self._report.assumed("map", "no map", message, hints=("`--map none=FILE.geojson` gives one",))
+            self._report.assume("map", "no map", message, hints=("`--map none=FILE.geojson` gives one",))
             return
         message = f"map `{map_name}` is not there; its labels are kept without a road network"
         hint = f"`--map {map_name}=FILE.geojson` gives the map"
-        for _ in range(labels):
-            self._report.kept("label", "map-missing", message, name=map_name, hints=(hint,))
+        for _ in range(label_count):
+            self._report.keep("label", "map-missing", message, name=map_name, hints=(hint,))
 
     def _leave_out(self, message: str) -> None:
-        self._report.left_out("label", "record-invalid", message)
+        self._report.leave_out("label", "record-invalid", message)
 
     def _sound_rows(
-        self, found: RecordingColumns, problems: Problems, places: Sequence[object], labels: Sequence[int]
+        self, columns: RecordingColumns, problems: Problems, source_lines: Sequence[object], labels: Sequence[int]
     ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """Which objects and sensor files of some labels are sound; what is not is told."""
-        ids, tracks = found.objects.id, found.objects.track
+        """Which rows of objects and of sensor files are sound, for some labels; what is not is reported."""
+        ids, tracks = columns.objects.id, columns.objects.track
         objects = np.ones(len(ids), dtype=bool)
-        sensors = np.ones(len(found.paths), dtype=bool)
-        ends: list[int] = np.cumsum(found.object_counts).tolist()
-        files: list[int] = np.cumsum(found.sensor_counts).tolist()
+        sensors = np.ones(len(columns.paths), dtype=bool)
+        object_ends: list[int] = np.cumsum(columns.object_counts).tolist()
+        sensor_ends: list[int] = np.cumsum(columns.sensor_counts).tolist()
         for label in labels:
-            first, end = ends[label] - int(found.object_counts[label]), ends[label]
-            owner, ego = f"of label `{found.frames[label]}`", found.egos.track[label]
+            first, end = object_ends[label] - int(columns.object_counts[label]), object_ends[label]
+            owner, ego = f"of label `{columns.frames[label]}`", columns.egos.track[label]
             names, known = set(ids[first:end]), [track for track in tracks[first:end] if track is not None]
-            odd = len(names) < end - first or "ego" in names or len(set(known)) < len(known) or ego in known
-            if odd or not problems.objects.keys().isdisjoint(range(first, end)):
-                for row, fact in _unsound(ids, tracks, range(first, end), owner, ego, problems.objects):
+            # nearly all labels pass this test, which is cheaper than to go through their objects
+            ambiguous = len(names) < end - first or "ego" in names or len(set(known)) < len(known) or ego in known
+            if ambiguous or not problems.objects.keys().isdisjoint(range(first, end)):
+                for row, fact in _find_unsound(ids, tracks, range(first, end), owner, ego, problems.objects):
                     objects[row] = False
-                    self._report.left_out("object", "record-invalid", f"{places[label]}: {fact}")
-            for row in range(files[label] - int(found.sensor_counts[label]), files[label]):
+                    self._report.leave_out("object", "record-invalid", f"{source_lines[label]}: {fact}")
+            for row in range(sensor_ends[label] - int(columns.sensor_counts[label]), sensor_ends[label]):
                 if (problem := problems.sensors.get(row)) is not None:
                     sensors[row] = False
-                    message = f"{places[label]}: sensor file `{found.channels[row]}` {owner}: {problem}"
-                    self._report.left_out("sensor file", "record-invalid", message)
+                    message = f"{source_lines[label]}: sensor file `{columns.channels[row]}` {owner}: {problem}"
+                    self._report.leave_out("sensor file", "record-invalid", message)
         return objects, sensors
 
 
-def _unsound(
+def _find_unsound(
     ids: Sequence[str], tracks: Sequence[str | None], rows: range, owner: str, ego: str | None,
     problems: Mapping[int, str],
 ) -> Iterator[tuple[int, str]]:  # fmt: skip
-    """The objects of a label that are left out, and why; of two with one id or one track the first is kept."""
+    """The rows of a label's objects that are left out, with the reason; of equal ids or tracks, the first stays."""
     seen = {"ego"}
     owners: dict[str, str] = {} if ego is None else {ego: "ego"}
     for row in rows:
@@ -295,8 +300,8 @@ def read_maps(files: Mapping[str, Path], report: Report) -> dict[str, tuple[MapF
     """Read GeoJSON maps.
 
     Args:
-        files: File of each map.
-        report: Takes what is unsound.
+        files: Files by the names of maps.
+        report: Collects what is unsound.
 
     Raises:
         DataError: `file-missing` or `file-invalid`.
@@ -309,7 +314,7 @@ def read_maps(files: Mapping[str, Path], report: Report) -> dict[str, tuple[MapF
 
 
 def read_class_map(path: Path) -> dict[str, str]:
-    """Read `{class name of the source: class of the tree}`.
+    """Read a class map, `{class name of the source: class of the tree}`.
 
     Raises:
         DataError: `file-missing`, `file-invalid`, or `unknown-class` for a class that the tree lacks.

@@ -11,7 +11,7 @@ from typing import Any
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.geometry.features import MapFeature, ProblemSink
-from scenicq.importers.base import ClassNames, Entry, Labels, OpenedSource
+from scenicq.importers.base import ClassNames, LabelChecker, OpenedSource, RecordingEntry
 from scenicq.importers.folders import readable
 from scenicq.importers.recording_checks import tell_order
 from scenicq.importers.report import Report
@@ -28,13 +28,13 @@ class RecordingFiles:
     """Where a recording lies.
 
     Attributes:
-        name: Of the recording, unique in the source.
+        name: Name of the recording, unique in the source.
         files: What it is read from; the first is the main one.
         root: The source as the user gave it; paths of sensor files are relative to it.
         map: Name of its map.
         options: What else the importer's function needs to know.
         weight: About how many label objects it has; by default from the size of the main file.
-        digest: Of its content; by default of the files.
+        digest: Checksum of its content; by default of the files.
     """
 
     name: str
@@ -60,7 +60,7 @@ class FileReader:
     classes: Mapping[str, str]
     make: Make
 
-    def recordings(self, labels: Labels, report: Report) -> Iterator[RecordingColumns]:
+    def recordings(self, labels: LabelChecker, report: Report) -> Iterator[RecordingColumns]:
         """The recordings in order of their names."""
         classes = ClassNames(self.classes, report)
         for place in self.places:
@@ -68,10 +68,10 @@ class FileReader:
                 made = self.make(place, classes, report)
             except DataError as error:
                 for diagnostic in error.diagnostics:
-                    report.left_out("recording", diagnostic.code, diagnostic.message, hints=diagnostic.hints)
+                    report.leave_out("recording", diagnostic.code, diagnostic.message, hints=diagnostic.hints)
                 continue
             tell_order(place.name, [label.timestamp_us for label, _ in made], report, numbered=True)
-            if (recording := labels.recording(place.name, made)) is not None:
+            if (recording := labels.check_labels(place.name, made)) is not None:
                 yield recording
 
 
@@ -89,7 +89,7 @@ def by_file_source(
     """A source of such recordings.
 
     Args:
-        name: Of the source.
+        name: Name of the source.
         maps: Elements of each map.
         places: The recordings.
         classes: Class of the tree for each class name.
@@ -105,7 +105,7 @@ def by_file_source(
         name=readable(name),
         maps=maps,
         entries=tuple(
-            Entry(
+            RecordingEntry(
                 place.name,
                 _size(place.files[0]) // object_bytes if place.weight is None else place.weight,
                 place.digest or content_digest(place.files, place.options),
@@ -142,7 +142,7 @@ def map_sink(file: str, report: Report) -> ProblemSink:
     """Takes problems of a map; what dangles is kept, with a defect, as maps end somewhere."""
 
     def tell(element: str, problem: str) -> None:
-        add = report.kept if "is not in the map" in problem else report.left_out
+        add = report.keep if "is not in the map" in problem else report.leave_out
         add("map element", "map-invalid", f"{file}: element `{element}`: {problem}")
 
     return tell
@@ -158,7 +158,7 @@ def take_map(
     """Read a map, unless there is one of that name; one that cannot be read at all is left out.
 
     Args:
-        name: Of the map.
+        name: Name of the map.
         file: Where it lies.
         read: Reads it; what is unsound goes to the sink, counts of what is not read to the report.
         maps: Takes it.
@@ -170,7 +170,7 @@ def take_map(
         maps[name] = read(file, map_sink(file.name, report), report)
     except DataError as error:
         for diagnostic in error.diagnostics:
-            report.left_out("map", diagnostic.code, diagnostic.message)
+            report.leave_out("map", diagnostic.code, diagnostic.message)
 
 
 def missing(path: Path, what: str) -> DataError:

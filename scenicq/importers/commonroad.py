@@ -13,7 +13,7 @@ from xml.etree.ElementTree import Element
 
 from scenicq.geometry.angles import direction
 from scenicq.geometry.features import MapFeature, ProblemSink
-from scenicq.importers.base import ClassNames, OpenedSource, Options, read_maps
+from scenicq.importers.base import ClassNames, ImportOptions, OpenedSource, read_maps
 from scenicq.importers.by_file import RecordingFiles, by_file_source, missing, take_map
 from scenicq.importers.commonroad_map import lanelet_features
 from scenicq.importers.ego_choice import Moment, ego_facts, with_egos
@@ -22,7 +22,7 @@ from scenicq.importers.layouts import commonroad_files
 from scenicq.importers.motion import heading_of_yaw
 from scenicq.importers.recording_checks import radians
 from scenicq.importers.report import Report
-from scenicq.importers.specification import specification
+from scenicq.importers.specification import load_specification
 from scenicq.importers.xml_tree import attribute, number, read_xml
 from scenicq.store.classes import taxonomy
 from scenicq.store.labels import Label, LabelObject
@@ -43,7 +43,7 @@ class CommonRoad:
         """Whether the path is such a file or a folder of them."""
         return bool(commonroad_files(path))
 
-    def read(self, path: Path, options: Options, report: Report) -> OpenedSource:
+    def read(self, path: Path, options: ImportOptions, report: Report) -> OpenedSource:
         """Open scenarios: their maps are read here, obstacles in turn.
 
         Raises:
@@ -76,10 +76,10 @@ def _read_map(file: Path, on_problem: ProblemSink, report: Report) -> tuple[MapF
 def _read_scenario(place: RecordingFiles, classes: ClassNames, report: Report) -> list[tuple[Label, str]]:
     file = place.files[0]
     root = read_xml(file)
-    specification("commonroad").count_xml(root, report)
+    load_specification("commonroad").count_xml(root, report)
     step_s = _step(root)
     if step_s is None:
-        report.left_out("recording", "record-invalid", f"{file.name}: `timeStepSize` is not a positive number")
+        report.leave_out("recording", "record-invalid", f"{file.name}: `timeStepSize` is not a positive number")
         return []
     moving: dict[int, list[LabelObject]] = {}
     standing: list[LabelObject] = []
@@ -90,11 +90,11 @@ def _read_scenario(place: RecordingFiles, classes: ClassNames, report: Report) -
             name, size = attribute(element, "id"), _size(element)
             states = element.findall("initialState") + element.findall("trajectory/state")
         except InvalidError as error:
-            report.left_out("track", "record-invalid", f"{where}: {error}")
+            report.leave_out("track", "record-invalid", f"{where}: {error}")
             continue
         if sets := element.findall("occupancySet/occupancy"):
             message = f"{where}: where it may be is known only as {len(sets)} areas; it is in no frame after the first"
-            report.left_out("object", "record-invalid", message)
+            report.leave_out("object", "record-invalid", message)
         for index, state in enumerate(states):
             try:
                 member = _object(name, kind, size, state, classes, report)
@@ -103,7 +103,7 @@ def _read_scenario(place: RecordingFiles, classes: ClassNames, report: Report) -
                     break
                 moving.setdefault(_time(state, index), []).append(member)
             except InvalidError as error:
-                report.left_out("object", "record-invalid", f"{where}: state {index}: {error}")
+                report.leave_out("object", "record-invalid", f"{where}: state {index}: {error}")
     params = _params(root)
     moments = [
         Moment(f"{place.name}/{step}", round(step * step_s * 1e6), (*moving.get(step, ()), *standing), params)

@@ -45,10 +45,10 @@ def with_egos(
 
     Args:
         moments: The frames.
-        choice: `Options.ego`.
+        choice: `ImportOptions.ego`.
         recording: Name of the recording.
         map_name: Name of its map.
-        place: Of the recording in the source, for messages.
+        place: File and line of the recording in the source, for messages.
         report: Takes what is left out.
     """
     if choice is None:
@@ -56,13 +56,13 @@ def with_egos(
             f"{place}: the source has no ego; in each frame it is the vehicle nearest to the middle of all objects"
         )
         hint = "`--ego ID`, `--ego nearest` or `--ego none` says what it is to be"
-        report.kept("recording", "record-invalid", message, name="no ego", hints=(hint,))
+        report.keep("recording", "record-invalid", message, name="no ego", hints=(hint,))
     made: list[tuple[Label, str]] = []
     for moment in moments:
         ego = viewpoint(moment.objects) if choice == "none" else _ego(moment.objects, choice)
         if ego is None:
             what = f"track `{choice}`" if choice not in (None, "nearest", "none") else "object"
-            report.left_out("label", "record-invalid", f"{place}: frame `{moment.frame}` has no {what} to be the ego")
+            report.leave_out("label", "record-invalid", f"{place}: frame `{moment.frame}` has no {what} to be the ego")
             continue
         others = tuple(member for member in moment.objects if member is not ego)
         named = ego if ego.id == "ego" else replace(ego, id="ego", track=ego.track or ego.id)

@@ -53,14 +53,14 @@ class GroupedLines:
 
     Attributes:
         files: Files that one can jump in, with their names in messages.
-        runs: Of each recording.
+        runs: Runs of lines, by recording.
     """
 
     files: tuple[tuple[Path, str], ...]
     runs: Mapping[str, Runs] = field(repr=False)
 
     def of(self, recordings: Sequence[str]) -> GroupedLines:
-        """The same of some recordings."""
+        """Select some recordings."""
         return GroupedLines(self.files, {name: self.runs[name] for name in recordings})
 
     def read(self, recording: str) -> Iterator[tuple[bytes, str]]:
@@ -130,7 +130,7 @@ def _note(number: int, file: IO[bytes], name: str, found: dict[str, _Found], rep
     for line, (content, length) in enumerate(_lines(file, bounds.longest), start=1):
         if content is None:
             message = f"{name}:{line}: a line of {length:,} bytes is no label"
-            report.left_out("label", "file-invalid", message)
+            report.leave_out("label", "file-invalid", message)
         elif not content.strip():
             empty += 1
             if empty > bounds.empty:
@@ -178,12 +178,12 @@ def _recording(content: bytes, place: str, report: Report) -> str | None:
     try:
         fields = parse_json(content)
     except InvalidError as error:
-        report.left_out("label", "file-invalid", f"{place}: {error}")
+        report.leave_out("label", "file-invalid", f"{place}: {error}")
         return None
     recording = cast(dict[str, object], fields).get("recording") if isinstance(fields, dict) else None
     if isinstance(recording, str):
         return recording
-    report.left_out("label", "record-invalid", f"{place}: `recording` is missing or is not a text")
+    report.leave_out("label", "record-invalid", f"{place}: `recording` is missing or is not a text")
     return None
 
 
@@ -230,7 +230,7 @@ def _parquet_lines(file: Path, report: Report) -> Iterator[bytes]:
                     try:
                         yield json.dumps(fields).encode() + b"\n"
                     except TypeError as error:
-                        report.left_out("label", "record-invalid", f"{file.name}:{row}: {error}")
+                        report.leave_out("label", "record-invalid", f"{file.name}:{row}: {error}")
                         yield b"\n"
     except (pa.ArrowException, ValueError, OverflowError) as error:
         raise DataError(Diagnostic("file-invalid", f"{file} is not a Parquet file: {error}")) from error

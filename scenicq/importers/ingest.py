@@ -14,7 +14,7 @@ from pathlib import Path
 
 from scenicq import __version__
 from scenicq.errors import DataError, Diagnostic
-from scenicq.importers.base import Entry, Importer, OpenedSource, Options, read_class_map
+from scenicq.importers.base import Importer, ImportOptions, OpenedSource, RecordingEntry, read_class_map
 from scenicq.importers.fields import LONGEST_TEXT
 from scenicq.importers.folders import readable
 from scenicq.importers.opendrive import convert_maps
@@ -100,7 +100,7 @@ def ingest(
         maps: GeoJSON or OpenDRIVE maps, `FILE` (the map is called like the file) or `NAME=FILE`; they replace maps of
             the source.
         class_map: JSON file {class of the source: class of the tree}, before the source's own classes.
-        ego: For sources without an ego: a track, "nearest" or "none"; see `Options.ego`.
+        ego: For sources without an ego: a track, "nearest" or "none"; see `ImportOptions.ego`.
         map_cache: Folder that keeps what Scenic's parser makes of OpenDRIVE maps; a temporary one by default.
         strict: Whether the first problem of the source is an error.
         force: Whether a dataset that is there already may be replaced, and everything is to be done anew.
@@ -122,7 +122,7 @@ def ingest(
     with _terminable(), DatasetWriter(target_path, {}, force=force, update=update) as writer:
         scratch = _scratch(writer)
         converted = convert_maps(given, scratch if map_cache is None else Path(map_cache), report)
-        options = Options(converted, classes, scratch, ego)
+        options = ImportOptions(converted, classes, scratch, ego)
         opened = importer.read(source_path, options, report)
         if opened.maps:
             from scenicq.importers.map_files import on_the_map  # noqa: PLC0415 - slow to load, and for maps
@@ -222,7 +222,7 @@ def _known(writer: DatasetWriter, target: Path | None) -> _EarlierWork:
 def _write_all(
     opened: OpenedSource,
     writer: DatasetWriter,
-    groups: Sequence[Sequence[Entry]],
+    groups: Sequence[Sequence[RecordingEntry]],
     known: _EarlierWork,
     context: Sequence[str],
     *,
@@ -331,7 +331,7 @@ def _map_files(maps: Sequence[str | Path]) -> dict[str, Path]:
 
 
 def _provenance(
-    source: Path, opened: OpenedSource, options: Options, class_map: str | Path | None, strict: bool
+    source: Path, opened: OpenedSource, options: ImportOptions, class_map: str | Path | None, strict: bool
 ) -> Provenance:
     return Provenance(
         source=readable(source),

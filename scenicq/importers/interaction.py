@@ -15,7 +15,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from scenicq.errors import DataError
-from scenicq.importers.base import ClassNames, OpenedSource, Options, read_maps
+from scenicq.importers.base import ClassNames, ImportOptions, OpenedSource, read_maps
 from scenicq.importers.by_file import RecordingFiles, by_file_source, missing, take_map
 from scenicq.importers.ego_choice import Moment, ego_facts, with_egos
 from scenicq.importers.fields import InvalidError
@@ -25,7 +25,7 @@ from scenicq.importers.layouts import INTERACTION_PARTS, interaction_files
 from scenicq.importers.motion import heading_of_yaw
 from scenicq.importers.recording_checks import radians
 from scenicq.importers.report import Report
-from scenicq.importers.specification import specification
+from scenicq.importers.specification import load_specification
 from scenicq.store.classes import taxonomy
 from scenicq.store.labels import Label, LabelObject
 
@@ -44,7 +44,7 @@ class Interaction:
         """Whether the path is the dataset, a scene's folder or one above."""
         return bool(interaction_files(path))
 
-    def read(self, path: Path, options: Options, report: Report) -> OpenedSource:
+    def read(self, path: Path, options: ImportOptions, report: Report) -> OpenedSource:
         """Open track files; each is a recording.
 
         Raises:
@@ -64,7 +64,7 @@ class Interaction:
                 places += _places(file, path, scene, f"{scene}/{number}", choice, report)
             except DataError as error:
                 for diagnostic in error.diagnostics:
-                    report.left_out("recording", diagnostic.code, diagnostic.message)
+                    report.leave_out("recording", diagnostic.code, diagnostic.message)
         return by_file_source(
             f"interaction-{path.resolve().name}",
             maps,
@@ -92,7 +92,7 @@ def _places(file: Path, root: Path, scene: str, name: str, choice: str, report: 
     cases = [cases_of(each) for each in both]
     for each, found in zip(both, cases, strict=True):
         rows = sum(case.rows for case in found.values())
-        specification("interaction").count_columns("", columns_of(each), report, rows)
+        load_specification("interaction").count_columns("", columns_of(each), report, rows)
     for case in dict.fromkeys(case for found in cases for case in found):
         found = [each.get(case, Case()) for each in cases]
         yield RecordingFiles(
@@ -124,7 +124,7 @@ def _read_tracks(place: RecordingFiles, classes: ClassNames, report: Report) -> 
                     raise InvalidError(f"frame {frame} has another time than before")
                 members.setdefault(frame, []).append(_object(row, classes, report))
             except InvalidError as error:
-                report.left_out("object", "record-invalid", f"{file.name}: {place.name}: row {number}: {error}")
+                report.leave_out("object", "record-invalid", f"{file.name}: {place.name}: row {number}: {error}")
     told = _apart(members, place.name, report)
     moments = [Moment(f"{place.name}/{frame}", times[frame] * 1000, tuple(told[frame])) for frame in sorted(members)]
     return with_egos(moments, choice or None, place.name, place.map, place.name, report)
@@ -138,7 +138,7 @@ def _apart(members: dict[int, list[LabelObject]], name: str, report: Report) -> 
         shared |= {key for key, count in Counter(key for key, _ in kinds).items() if count > 1}
     if not shared:
         return members
-    report.assumed(
+    report.assume(
         "recording", "people numbered apart",
         f"{name}: track {min(shared)} is a vehicle and a person at one time; such people are called `P` and the number",
     )  # fmt: skip

@@ -22,10 +22,10 @@ from scenicq.errors import DataError, Diagnostic
 from scenicq.importers import fields
 from scenicq.importers.base import (
     ClassNames,
-    Entry,
-    Labels,
+    ImportOptions,
+    LabelChecker,
     OpenedSource,
-    Options,
+    RecordingEntry,
     read_class_map,
     read_maps,
 )
@@ -37,7 +37,7 @@ from scenicq.importers.interchange_labels import LabelLines
 from scenicq.importers.layouts import is_interchange
 from scenicq.importers.recording_checks import tell_order
 from scenicq.importers.report import Report
-from scenicq.importers.specification import specification
+from scenicq.importers.specification import load_specification
 from scenicq.store.classes import taxonomy, taxonomy_names
 from scenicq.store.columns import RecordingColumns
 
@@ -60,7 +60,7 @@ class Interchange:
         """Whether `dataset.json` has the key `interchange`."""
         return is_interchange(path)
 
-    def read(self, path: Path, options: Options, report: Report) -> OpenedSource:
+    def read(self, path: Path, options: ImportOptions, report: Report) -> OpenedSource:
         """Open an interchange folder.
 
         Raises:
@@ -68,7 +68,7 @@ class Interchange:
             ValueError: Labels are packed, and `options` has no scratch folder.
         """
         header = _header(path)
-        specification("interchange").count_rows((header,), report, "dataset.json")
+        load_specification("interchange").count_rows((header,), report, "dataset.json")
         angle = header.get("angle")
         if angle not in ("heading", "yaw"):
             raise _invalid(path, '`angle` must be "heading" or "yaw"')
@@ -83,7 +83,9 @@ class Interchange:
         return OpenedSource(
             name=name if isinstance(name, str) and name else readable(path.resolve().name),
             maps=maps,
-            entries=tuple(Entry(name, size // _OBJECT_BYTES, digest) for name, (size, digest) in about.items()),
+            entries=tuple(
+                RecordingEntry(name, size // _OBJECT_BYTES, digest) for name, (size, digest) in about.items()
+            ),
             reader=lambda names: LineReader(lines.of(names), classes, angle),
             frames=count,
             context=json.dumps([angle, sorted(classes.items())]),
@@ -105,7 +107,7 @@ class LineReader:
     classes: Mapping[str, str]
     angle: str
 
-    def recordings(self, labels: Labels, report: Report) -> Iterator[RecordingColumns]:
+    def recordings(self, labels: LabelChecker, report: Report) -> Iterator[RecordingColumns]:
         """The recordings in order of their names."""
         classes = ClassNames(self.classes, report)
         for name in self.lines.runs:
@@ -114,7 +116,7 @@ class LineReader:
                 read.add(text, place)
             for _, pairs in groupby(zip(read.places, read.times_us, strict=True), _file):
                 tell_order(name, [time for _, time in pairs], report, numbered=False)
-            if (found := labels.sound(read.columns(), read.places, read.maps)) is not None:
+            if (found := labels.check_columns(read.columns(), read.places, read.maps)) is not None:
                 yield found
 
 

@@ -15,12 +15,12 @@ from scenicq.geometry.angles import normalize_array
 from scenicq.geometry.camera import Camera
 from scenicq.importers import fields
 from scenicq.importers.base import ClassNames
-from scenicq.importers.cameras import camera_of
+from scenicq.importers.cameras import read_camera
 from scenicq.importers.ego_choice import middle
 from scenicq.importers.fields import NO_MAP, InvalidError, whole
 from scenicq.importers.recording_checks import radians
 from scenicq.importers.report import Report
-from scenicq.importers.specification import specification
+from scenicq.importers.specification import load_specification
 from scenicq.importers.typed_rows import (
     ABSENT,
     FullText,
@@ -78,7 +78,7 @@ class _Line(Struct, kw_only=True, forbid_unknown_fields=True):
     sensors: dict[str, Raw] | None = None
 
 
-_KNOWN = specification("interchange")
+_KNOWN = load_specification("interchange")
 _LINE = RowType(_Line, _KNOWN, "labels")
 _OTHER = {"heading": "yaw", "yaw": "heading"}
 _EGOS = {angle: RowType(_Ego, _KNOWN, "labels/ego", unread=other) for angle, other in _OTHER.items()}
@@ -181,16 +181,16 @@ class LabelLines:
             line = _LINE.decode(text, self._report)
         except (UnicodeDecodeError, NoJsonError) as error:
             why = error if isinstance(error, NoJsonError) else f"not JSON: {error}"
-            self._report.left_out("label", "file-invalid", f"{place}: {why}")
+            self._report.leave_out("label", "file-invalid", f"{place}: {why}")
             return
         except RowError as error:
             name = "" if error.name is None else f"label `{error.name}`: "
-            self._report.left_out("label", "record-invalid", f"{place}: {name}{error}")
+            self._report.leave_out("label", "record-invalid", f"{place}: {name}{error}")
             return
         try:
             self._add(line, place)
         except InvalidError as error:
-            self._report.left_out("label", "record-invalid", f"{place}: label `{line.id}`: {error}")
+            self._report.leave_out("label", "record-invalid", f"{place}: label `{line.id}`: {error}")
 
     def _add(self, line: _Line, place: str) -> None:
         if line.recording != self._recording:
@@ -246,11 +246,11 @@ class LabelLines:
                 name = error.name if isinstance(error, RowError) else name
                 what = f"object number {number}" if name is None else f"object `{name}`"
                 message = f"{place}: {what} of label `{line.id}`: {error}"
-                self._report.left_out("object", "record-invalid", message)
+                self._report.leave_out("object", "record-invalid", message)
 
     def _check_angles(self, entry: _Member, at: str) -> None:
         if getattr(entry, other := _OTHER[self._angle]) is not ABSENT:
-            self._report.not_read(f"labels/{at}/{other}")
+            self._report.count_unread(f"labels/{at}/{other}")
         # null says that it is not known; a key that is missing is more likely misspelt
         if getattr(entry, self._angle) is UNSET:
             raise InvalidError(f"`{self._angle}` is missing")
@@ -270,14 +270,14 @@ class LabelLines:
             _KNOWN.count_rows((record,), self._report, "labels/sensors/*")
             path, camera = fields.text(record, "path"), None
             try:
-                camera = camera_of(record)
+                camera = read_camera(record)
             except InvalidError as error:
                 message = f"{place}: camera `{channel}` of label `{line.id}`: {error}"
-                self._report.left_out("camera", "record-invalid", message)
+                self._report.leave_out("camera", "record-invalid", message)
             yield channel, path, camera
 
     def _telling(self, where: str) -> Callable[[str], None]:
-        return lambda problem: self._report.left_out("attribute", "record-invalid", f"{where}: {problem}")
+        return lambda problem: self._report.leave_out("attribute", "record-invalid", f"{where}: {problem}")
 
 
 def _reals(values: list[float | None]) -> NDArray[np.float64]:

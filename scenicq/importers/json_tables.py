@@ -12,7 +12,7 @@ from msgspec import DecodeError, Raw, ValidationError
 from msgspec.json import Decoder
 
 from scenicq.errors import DataError, Diagnostic
-from scenicq.garbage import without_collector
+from scenicq.garbage import pause_collector
 
 __all__ = ["ElementBlock", "read_list"]
 
@@ -133,7 +133,7 @@ def _many(buffer: str, position: int, line: int, rows: Decoder[list[T]]) -> Elem
     text = buffer[position : ends[-1]]
     try:
         try:
-            with without_collector():
+            with pause_collector():
                 return ElementBlock(text, line, rows.decode(f"[{text}]"))
         except ValidationError:
             _ELEMENTS.decode(f"[{text}]")

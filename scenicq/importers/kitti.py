@@ -16,14 +16,14 @@ from pathlib import Path
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.geometry.angles import rotate
-from scenicq.importers.base import ClassNames, OpenedSource, Options, read_maps
+from scenicq.importers.base import ClassNames, ImportOptions, OpenedSource, read_maps
 from scenicq.importers.by_file import RecordingFiles, by_file_source, missing
 from scenicq.importers.fields import NO_MAP, InvalidError
 from scenicq.importers.layouts import kitti_files
-from scenicq.importers.motion import Rigid, euler, matrix, velocities
+from scenicq.importers.motion import RigidTransform, pose_of_euler_angles, pose_of_matrix, velocities
 from scenicq.importers.recording_checks import radians
 from scenicq.importers.report import Report
-from scenicq.importers.specification import specification
+from scenicq.importers.specification import load_specification
 from scenicq.store.classes import taxonomy
 from scenicq.store.labels import Label, LabelObject
 
@@ -48,7 +48,7 @@ _FORWARD, _LEFTWARD = _OXTS.index("vf"), _OXTS.index("vl")
 
 _EARTH_M = 6378137.0
 _LARGEST_BYTES = 256 << 20
-_FORWARD_CAMERA = Rigid((0.0, -1.0, 0.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+_FORWARD_CAMERA = RigidTransform((0.0, -1.0, 0.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 """A camera that looks ahead from the inertial unit, whose x is ahead, y left and z up."""
 
 
@@ -62,7 +62,7 @@ class Kitti:
         """Whether the path has the labels."""
         return bool(kitti_files(path))
 
-    def read(self, path: Path, options: Options, report: Report) -> OpenedSource:
+    def read(self, path: Path, options: ImportOptions, report: Report) -> OpenedSource:
         """Open sequences; each is a recording.
 
         Raises:
@@ -97,16 +97,16 @@ def _place(file: Path, root: Path, map_name: str) -> RecordingFiles:
 
 def _read_sequence(place: RecordingFiles, classes: ClassNames, report: Report) -> list[tuple[Label, str]]:
     file = place.files[0]
-    specification("kitti").count_files((each.name for each in file.parent.parent.iterdir()), report)
+    load_specification("kitti").count_files((each.name for each in file.parent.parent.iterdir()), report)
     extra = {path.parent.name: path for path in place.files[1:]}
     camera = _FORWARD_CAMERA
     if "calib" in extra:
         camera = _camera(extra["calib"], report)
     else:
-        report.kept("recording", "file-missing", f"{file.name}: no `calib`; the camera looks ahead from the ego")
+        report.keep("recording", "file-missing", f"{file.name}: no `calib`; the camera looks ahead from the ego")
     poses = _poses(extra["oxts"], report) if "oxts" in extra else None
     if poses is None:
-        report.kept("recording", "file-missing", f"{file.name}: no `oxts`; the ego stays at the origin")
+        report.keep("recording", "file-missing", f"{file.name}: no `oxts`; the ego stays at the origin")
     by_frame: defaultdict[int, list[LabelObject]] = defaultdict(list)
     for number, row in enumerate(_rows(file), start=1):
         where = f"{file.name}:{number}"
@@ -115,29 +115,31 @@ def _read_sequence(place: RecordingFiles, classes: ClassNames, report: Report) -
             if frame < 0 or frame > 1_000_000:
                 raise InvalidError("the frame is not a number")
             if len(row) > 2 and row[2] == "DontCare":
-                report.not_read(f"{_LABELS}/DontCare")
+                report.count_unread(f"{_LABELS}/DontCare")
                 continue
             _count_columns(_LABELS, _LABEL, len(row), report)
             if poses is not None and frame >= len(poses):
                 raise InvalidError(f"frame {frame} has no pose")
-            ego = Rigid((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
-            by_frame[frame].append(_object(row, (poses[frame].place if poses else ego).then(camera), classes, report))
+            ego = RigidTransform((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
+            by_frame[frame].append(
+                _object(row, (poses[frame].place if poses else ego).compose(camera), classes, report)
+            )
         except InvalidError as error:
-            report.left_out("object", "record-invalid", f"{where}: {error}")
+            report.leave_out("object", "record-invalid", f"{where}: {error}")
     return _labels(place, by_frame, poses)
 
 
 def _count_columns(table: str, names: Sequence[str], count: int, report: Report) -> None:
     """Count what is not read of a row of some columns; columns that the specification does not name have a number."""
     there = (*dict.fromkeys(names[:count]), *(f"column {number + 1}" for number in range(len(names), count)))
-    specification("kitti").count_columns(table, there, report)
+    load_specification("kitti").count_columns(table, there, report)
 
 
 @dataclass(frozen=True, slots=True)
 class _Pose:
     """The inertial unit at a frame: where it is, and its velocity, which has been 0 where nobody wrote it."""
 
-    place: Rigid
+    place: RigidTransform
     velocity: tuple[float, float]
 
 
@@ -193,24 +195,24 @@ def _moving(member: LabelObject, velocity: tuple[float, float] | None) -> LabelO
     )
 
 
-def _object(row: list[str], camera: Rigid, classes: ClassNames, report: Report) -> LabelObject:
+def _object(row: list[str], camera: RigidTransform, classes: ClassNames, report: Report) -> LabelObject:
     if len(row) < 17:
         raise InvalidError(f"the row has {len(row)} columns, not 17")
     height, width, length, x, y, z, turn = _numbers(row[10:17])
     if min(height, width, length) <= 0:
         raise InvalidError("its size is not positive")
-    at = camera.place((x, y - height / 2, z))
+    at = camera.transform_point((x, y - height / 2, z))
     radians(turn, report)
-    ahead = camera.turn((math.cos(turn), 0.0, -math.sin(turn)))
+    ahead = camera.rotate((math.cos(turn), 0.0, -math.sin(turn)))
     attributes: dict[str, str | float | bool] = {"truncated": float(_numbers(row[3:4])[0]), "occluded": row[4]}
-    heading = Rigid(ahead, ahead, ahead, at).heading
+    heading = RigidTransform(ahead, ahead, ahead, at).heading
     name = row[1]
     return LabelObject(
         name, classes.category(row[2]), row[2], at[0], at[1], heading, width, length, height, None, name, attributes
     )
 
 
-def _camera(file: Path, report: Report) -> Rigid:
+def _camera(file: Path, report: Report) -> RigidTransform:
     """The rectified camera, seen from the inertial unit."""
     spellings = {other: names[0] for names in _MATRICES for other in names}
     found: dict[str, list[float]] = {}
@@ -220,10 +222,10 @@ def _camera(file: Path, report: Report) -> Rigid:
             if len(row) in (10, 13):
                 found[name] = _numbers(row[1:])
             if name:
-                specification("kitti").count(f"calib/{spellings.get(name, name)}", report)
+                load_specification("kitti").count(f"calib/{spellings.get(name, name)}", report)
         steps = [_rows_of(next(found[name] for name in names if name in found)) for names in _MATRICES]
-        rectified, velodyne, unit = (matrix(step) for step in steps)
-        return rectified.then(velodyne).then(unit).inverse()
+        rectified, velodyne, unit = (pose_of_matrix(step) for step in steps)
+        return rectified.compose(velodyne).compose(unit).inverse()
     except InvalidError as error:
         raise DataError(Diagnostic("file-invalid", f"{file}: no sound calibration: {error}")) from error
     except StopIteration:
@@ -258,7 +260,7 @@ def _poses(file: Path, report: Report) -> list[_Pose]:
         east = scale * _EARTH_M * math.radians(longitude)
         north = scale * _EARTH_M * math.log(math.tan(math.radians(90 + latitude) / 2))
         first = first or (east, north)
-        place = euler(roll, pitch, yaw, (east - first[0], north - first[1], altitude))
+        place = pose_of_euler_angles(roll, pitch, yaw, (east - first[0], north - first[1], altitude))
         found.append(_Pose(place, rotate(-left, forward, place.heading)))
     return found
 

@@ -58,7 +58,7 @@ def cut_lanes(lengths: Mapping[str, float], beside: Mapping[str, Sequence[Beside
     """The parts of each lane, in order.
 
     Args:
-        lengths: Of each lane, metres.
+        lengths: Length of each lane, metres.
         beside: What lies beside each lane; lanes that have no length here are not there.
         least_m: Cuts nearer to each other, or to an end, are one.
     """

@@ -21,7 +21,7 @@ from scenicq.geometry.features import MapFeature, ProblemSink
 from scenicq.importers.fields import InvalidError
 from scenicq.importers.lane_graph import BoundedLane, lane_features, sound_area
 from scenicq.importers.report import Report
-from scenicq.importers.specification import specification
+from scenicq.importers.specification import load_specification
 from scenicq.importers.xml_tree import attribute, read_xml
 
 __all__ = ["read_lanelets", "utm"]
@@ -85,7 +85,7 @@ def read_lanelets(path: Path, on_problem: ProblemSink, report: Report) -> tuple[
 
 def _count(root: Element, report: Report) -> None:
     """Count what is left out: the format says kinds in tags and roles, not in names of elements."""
-    known = specification("lanelet2")
+    known = load_specification("lanelet2")
     lanelets = [each for each in root.iter("relation") if _tags(each).get("type") == "lanelet"]
     sides = {member.get("ref") for each in lanelets for member in each.iter("member") if member.get("role") in _SIDES}
     for name in root.attrib:
@@ -100,7 +100,7 @@ def _count(root: Element, report: Report) -> None:
         if not known.count(path, report):
             continue
         if path == "relation/lanelet" and tags.get("one_way") == "no" and tags.get("subtype") not in _AREAS:
-            report.not_read('relation/lanelet/tag/one_way="no": the other direction')
+            report.count_unread('relation/lanelet/tag/one_way="no": the other direction')
         inner = [f"@{name}" for name in element.attrib]
         inner += [
             f"tag/{child.get('k')}"

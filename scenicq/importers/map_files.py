@@ -22,7 +22,7 @@ from scenicq.geometry.features import (
 )
 from scenicq.importers.fields import InvalidError, check_characters
 from scenicq.importers.report import Report
-from scenicq.importers.specification import specification
+from scenicq.importers.specification import load_specification
 from scenicq.store.map_validation import properties_problem
 from scenicq.store.value_rules import LONGEST_NAME, json_object
 from scenicq.store.wkb import FARTHEST_M
@@ -42,14 +42,14 @@ def on_the_map(maps: Mapping[str, Sequence[MapFeature]], report: Report) -> dict
         unsound = {feature.id: problem for feature in features if (problem := _element_problem(feature))}
         for each in sorted(unsound):
             message = f"map `{name}`: element `{each}` {unsound[each]}"
-            report.left_out("map element", "map-invalid", message)
+            report.leave_out("map element", "map-invalid", message)
         kept[name] = tuple(feature for feature in features if feature.id not in unsound)
         if not features:
             message = f"map `{name}` has no elements; its labels are kept without a road network"
-            report.assumed("map", "no elements", message)
+            report.assume("map", "no elements", message)
         for kind, count in Counter(feature.kind for feature in kept[name]).items():
             if kind not in KNOWN_KINDS and region_name(kind) is None:
-                report.not_read(f"map elements of the kind `{kind}`, which no program can name", count)
+                report.count_unread(f"map elements of the kind `{kind}`, which no program can name", count)
     return kept
 
 
@@ -82,11 +82,11 @@ def read_geojson_maps(files: Mapping[str, Path], report: Report) -> dict[str, tu
         problems: list[tuple[str, str]] = []
         document = load_geojson(files[name])
         features = read_geojson(document, _collector(problems), name=str(files[name]))
-        specification("geojson").count_json(document, report)
+        load_specification("geojson").count_json(document, report)
         references = set(dangling(features)) if problems else set[tuple[str, str]]()
         for problem in problems:
             message = f"{files[name].name}: element `{problem[0]}`: {problem[1]}"
-            tell = report.kept if problem in references else report.left_out
+            tell = report.keep if problem in references else report.leave_out
             tell("map element", "map-invalid", message)
         if not _storable(features):
             features = tuple(_storable_of(features, files[name].name, report))
@@ -107,12 +107,12 @@ def _storable(features: Sequence[MapFeature]) -> bool:
 
 
 def _storable_of(features: Sequence[MapFeature], file: str, report: Report) -> Iterator[MapFeature]:
-    """Those whose texts can be stored; the others are reported."""
+    """Keep the elements whose texts can be stored, and report the others."""
     for feature in features:
         try:
             check_characters(_texts(feature))
         except InvalidError as error:
-            report.left_out("map element", "map-invalid", f"{file}: element {feature.id!a}: {error}")
+            report.leave_out("map element", "map-invalid", f"{file}: element {feature.id!a}: {error}")
         else:
             yield feature
 

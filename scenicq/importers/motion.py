@@ -1,4 +1,8 @@
-"""What tracks and poses have in common in every format: velocity from positions, poses in space."""
+"""Poses in space, in every notation that formats have, and velocities from the positions of a track.
+
+A pose is a `RigidTransform`: it maps points of a body's frame to another frame, such as the map's. Lengths are in
+metres, angles in radians.
+"""
 
 from __future__ import annotations
 
@@ -11,13 +15,13 @@ from scenicq.importers.fields import InvalidError
 
 __all__ = [
     "Quaternion",
-    "Rigid",
+    "RigidTransform",
     "Vector",
-    "euler",
     "heading_of_yaw",
-    "matrix",
-    "quaternion",
-    "turns",
+    "pose_of_euler_angles",
+    "pose_of_matrix",
+    "pose_of_quaternion",
+    "pose_of_rotations",
     "unit_quaternion",
     "velocities",
 ]
@@ -27,12 +31,12 @@ Quaternion = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
-class Rigid:
-    """A pose in space: the frame of a body as seen from another frame.
+class RigidTransform:
+    """The pose of a body: the transform from its frame to a reference frame.
 
     Attributes:
-        x, y, z: Unit vectors of the body's axes.
-        origin: The body's origin, metres.
+        x, y, z: The body's axes, unit vectors of the reference frame.
+        origin: The body's origin in the reference frame, metres.
     """
 
     x: Vector
@@ -40,13 +44,13 @@ class Rigid:
     z: Vector
     origin: Vector
 
-    def place(self, point: Vector) -> Vector:
-        """A point of the body's frame, seen from the other frame."""
-        a, b, c = self.turn(point)
+    def transform_point(self, point: Vector) -> Vector:
+        """Map a point from the body's frame to the reference frame."""
+        a, b, c = self.rotate(point)
         return a + self.origin[0], b + self.origin[1], c + self.origin[2]
 
-    def turn(self, vector: Vector) -> Vector:
-        """A direction of the body's frame, seen from the other frame."""
+    def rotate(self, vector: Vector) -> Vector:
+        """Map a direction from the body's frame to the reference frame."""
         a, b, c = vector
         return (
             a * self.x[0] + b * self.y[0] + c * self.z[0],
@@ -54,37 +58,38 @@ class Rigid:
             a * self.x[2] + b * self.y[2] + c * self.z[2],
         )
 
-    def then(self, inner: Rigid) -> Rigid:
-        """The frame `inner`, given in this body's frame, seen from the other frame."""
-        return Rigid(self.turn(inner.x), self.turn(inner.y), self.turn(inner.z), self.place(inner.origin))
+    def compose(self, inner: RigidTransform) -> RigidTransform:
+        """The pose, in the reference frame, of what has the pose `inner` in this body's frame."""
+        axes = self.rotate(inner.x), self.rotate(inner.y), self.rotate(inner.z)
+        return RigidTransform(*axes, self.transform_point(inner.origin))
 
-    def inverse(self) -> Rigid:
-        """The other frame, seen from the body."""
+    def inverse(self) -> RigidTransform:
+        """The pose of the reference frame in the body's frame."""
         x, y, z = zip(self.x, self.y, self.z, strict=True)
-        a, b, c = Rigid(x, y, z, self.origin).turn(self.origin)
-        return Rigid(x, y, z, (-a, -b, -c))
+        a, b, c = RigidTransform(x, y, z, self.origin).rotate(self.origin)
+        return RigidTransform(x, y, z, (-a, -b, -c))
 
     @property
     def pitch(self) -> float:
-        """Turn about the y axis, radians, after which comes the heading's."""
+        """Rotation about the y axis, radians; the second of roll, pitch and heading."""
         return math.asin(max(-1.0, min(1.0, -self.x[2])))
 
     @property
     def roll(self) -> float:
-        """Turn about the x axis, radians, before the pitch."""
+        """Rotation about the x axis, radians; the first of roll, pitch and heading."""
         return math.atan2(self.y[2], self.z[2])
 
     @property
     def heading(self) -> float:
-        """Heading in (-pi, pi] of the x axis, seen from above."""
+        """Heading of the x axis seen from above, radians in (-pi, pi]."""
         return heading_of(self.x[0], self.x[1])
 
 
 def unit_quaternion(w: float, x: float, y: float, z: float) -> Quaternion:
-    """A quaternion w, x, y, z, made one of length 1.
+    """Scale a quaternion w, x, y, z to length 1.
 
     Raises:
-        InvalidError: It is far from a unit quaternion.
+        InvalidError: The length is not between 0.5 and 2.
     """
     norm = math.hypot(w, x, y, z)
     if not 0.5 < norm < 2:
@@ -92,14 +97,14 @@ def unit_quaternion(w: float, x: float, y: float, z: float) -> Quaternion:
     return w / norm, x / norm, y / norm, z / norm
 
 
-def quaternion(w: float, x: float, y: float, z: float, origin: Vector) -> Rigid:
-    """The pose of a unit quaternion, of either sign, and an origin.
+def pose_of_quaternion(w: float, x: float, y: float, z: float, origin: Vector) -> RigidTransform:
+    """The pose of a unit quaternion and an origin; the quaternion's sign makes no difference.
 
     Raises:
-        InvalidError: It is far from a unit quaternion.
+        InvalidError: The length is not between 0.5 and 2.
     """
     w, x, y, z = unit_quaternion(w, x, y, z)
-    return Rigid(
+    return RigidTransform(
         (1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)),
         (2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)),
         (2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)),
@@ -108,24 +113,24 @@ def quaternion(w: float, x: float, y: float, z: float, origin: Vector) -> Rigid:
 
 
 def heading_of_yaw(yaw: float) -> float:
-    """The heading in (-pi, pi] of an angle that a source counts counter-clockwise from +x, radians."""
+    """The heading, in (-pi, pi], of an angle counter-clockwise from +x; both in radians."""
     return normalize(yaw - math.pi / 2)
 
 
 def velocities(
     track: Sequence[tuple[int, float, float]], *, reach_us: int, longest_us: int
 ) -> list[tuple[float, float] | None]:
-    """Velocity at each point of a track by differences of positions: central, at the ends one-sided.
+    """The velocity at each point of a track, metres per second, by central differences (one-sided at the ends).
 
     Args:
-        track: Microseconds and position in metres, in order of time.
-        reach_us: How far from a point the others of its difference may be; always at least its neighbours.
-        longest_us: A gap longer than this separates; a point alone has no velocity.
+        track: Time in microseconds, x and y in metres; in order of time.
+        reach_us: Time from a point to the ends of its difference, at most; the nearest points always count.
+        longest_us: A gap longer than this splits the track. A point without neighbours has no velocity: None.
     """
     found: list[tuple[float, float] | None] = []
     for step in range(len(track)):
-        first = _reach(track, step, -1, reach_us, longest_us)
-        last = _reach(track, step, 1, reach_us, longest_us)
+        first = _end_of_difference(track, step, -1, reach_us, longest_us)
+        last = _end_of_difference(track, step, 1, reach_us, longest_us)
         seconds = (track[last][0] - track[first][0]) / 1e6
         if seconds <= 0:
             found.append(None)
@@ -135,21 +140,24 @@ def velocities(
     return found
 
 
-def _reach(track: Sequence[tuple[int, float, float]], step: int, way: int, reach_us: int, longest_us: int) -> int:
-    here = step
-    while 0 <= here + way < len(track):
-        if abs(track[here + way][0] - track[here][0]) > longest_us:
+def _end_of_difference(
+    track: Sequence[tuple[int, float, float]], step: int, direction: int, reach_us: int, longest_us: int
+) -> int:
+    """The farthest point of a track, forwards (1) or backwards (-1), that a difference at a point may use."""
+    end = step
+    while 0 <= end + direction < len(track):
+        if abs(track[end + direction][0] - track[end][0]) > longest_us:
             break
-        if here != step and abs(track[here + way][0] - track[step][0]) > reach_us:
+        if end != step and abs(track[end + direction][0] - track[step][0]) > reach_us:
             break
-        here += way
-    return here
+        end += direction
+    return end
 
 
-def euler(roll: float, pitch: float, yaw: float, origin: Vector) -> Rigid:
-    """The pose of a body turned about its x, then y, then z axis, each fixed, by angles in radians."""
-    cr, sr, cp, sp, cy, sy = *_turn(roll), *_turn(pitch), *_turn(yaw)
-    return Rigid(
+def pose_of_euler_angles(roll: float, pitch: float, yaw: float, origin: Vector) -> RigidTransform:
+    """The pose of a body that is rotated about the reference frame's x, then y, then z axis; angles in radians."""
+    cr, sr, cp, sp, cy, sy = *_cos_sin(roll), *_cos_sin(pitch), *_cos_sin(yaw)
+    return RigidTransform(
         (cy * cp, sy * cp, -sp),
         (cy * sp * sr - sy * cr, sy * sp * sr + cy * cr, cp * sr),
         (cy * sp * cr + sy * sr, sy * sp * cr - cy * sr, cp * cr),
@@ -157,32 +165,32 @@ def euler(roll: float, pitch: float, yaw: float, origin: Vector) -> Rigid:
     )
 
 
-def turns(axes: str, angles: Sequence[float], origin: Vector) -> Rigid:
-    """The pose of a body turned about its own axes, one after the other.
+def pose_of_rotations(axes: str, angles: Sequence[float], origin: Vector) -> RigidTransform:
+    """The pose of a body that is rotated about its own axes, one after the other.
 
     Args:
-        axes: Letters X, Y and Z.
-        angles: For each letter, radians.
+        axes: The letters X, Y and Z in the order of the rotations.
+        angles: The angle of each rotation, radians.
         origin: The body's origin, metres.
     """
-    pose = Rigid((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), origin)
+    pose = RigidTransform((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), origin)
     for axis, angle in zip(axes, angles, strict=True):
-        about = {"X": (angle, 0.0, 0.0), "Y": (0.0, angle, 0.0), "Z": (0.0, 0.0, angle)}[axis]
-        pose = pose.then(euler(*about, (0.0, 0.0, 0.0)))
+        roll_pitch_yaw = {"X": (angle, 0.0, 0.0), "Y": (0.0, angle, 0.0), "Z": (0.0, 0.0, angle)}[axis]
+        pose = pose.compose(pose_of_euler_angles(*roll_pitch_yaw, (0.0, 0.0, 0.0)))
     return pose
 
 
-def matrix(rows: Sequence[Sequence[float]]) -> Rigid:
-    """The pose of a matrix of three or four rows whose last column is the origin.
+def pose_of_matrix(rows: Sequence[Sequence[float]]) -> RigidTransform:
+    """The pose of a matrix with three or four rows: a rotation, and the origin in the last column.
 
     Raises:
-        InvalidError: It is no rotation.
+        InvalidError: A column is too long or too short for a rotation.
     """
     columns = [(rows[0][i], rows[1][i], rows[2][i]) for i in range(4)]
     if any(not 0.9 < math.hypot(*column) < 1.1 for column in columns[:3]):
         raise InvalidError("the matrix is not a rotation")
-    return Rigid(*columns)
+    return RigidTransform(*columns)
 
 
-def _turn(angle: float) -> tuple[float, float]:
+def _cos_sin(angle: float) -> tuple[float, float]:
     return math.cos(angle), math.sin(angle)

@@ -12,13 +12,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from scenicq.errors import DataError, Diagnostic
-from scenicq.importers.base import Entry, OpenedSource, Options, read_maps
+from scenicq.importers.base import ImportOptions, OpenedSource, RecordingEntry, read_maps
 from scenicq.importers.folders import readable
 from scenicq.importers.layouts import is_nuscenes, nuscenes_folders
 from scenicq.importers.nuscenes_scenes import AXLE_TO_CENTRE_M, EGO_SIZE_M, LONGEST_STEP_US, POSE_CHANNEL, SceneReader
 from scenicq.importers.nuscenes_tables import Tables
 from scenicq.importers.report import Report
-from scenicq.importers.specification import specification
+from scenicq.importers.specification import load_specification
 from scenicq.store.classes import taxonomy
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ class NuScenes:
         """Whether the path is a folder of tables, or has exactly one."""
         return is_nuscenes(path)
 
-    def read(self, path: Path, options: Options, report: Report) -> OpenedSource:
+    def read(self, path: Path, options: ImportOptions, report: Report) -> OpenedSource:
         """Open a dataroot or one of its `v1.0-*` folders.
 
         All tables are read here; memory grows with the source, about 200 bytes an annotation.
@@ -59,7 +59,7 @@ class NuScenes:
         missing = [name for name in _TABLES.split() if not (folder / f"{name}.json").is_file()]
         if missing:
             raise DataError([Diagnostic("file-missing", f"{folder / name}.json is not there") for name in missing])
-        specification("nuscenes").count_files(_files(path, folder), report)
+        load_specification("nuscenes").count_files(_files(path, folder), report)
         tables = Tables(folder, report)
         maps = _maps(folder.parent, tables.locations, options, report)
         classes = {**taxonomy("nuscenes"), **options.class_map}
@@ -68,7 +68,7 @@ class NuScenes:
         return OpenedSource(
             name=readable(f"nuscenes-{folder.name}"),
             maps=maps,
-            entries=tuple(Entry(scene.name, scene.weight, scene.digest()) for scene in scenes),
+            entries=tuple(RecordingEntry(scene.name, scene.weight, scene.digest()) for scene in scenes),
             reader=lambda names: SceneReader(tuple(by_name[name] for name in names), classes),
             frames=len(tables.samples),
             context=json.dumps(sorted(classes.items())),
@@ -91,7 +91,9 @@ def _files(path: Path, folder: Path) -> Iterator[str]:
         yield from (each.name for each in path.iterdir() if each != maps and not each.name.startswith("v1.0-"))
 
 
-def _maps(dataroot: Path, locations: list[str], options: Options, report: Report) -> dict[str, tuple[MapFeature, ...]]:
+def _maps(
+    dataroot: Path, locations: list[str], options: ImportOptions, report: Report
+) -> dict[str, tuple[MapFeature, ...]]:
     maps = read_maps(options.maps, report)
     for location in locations:
         expansion = dataroot / "maps" / "expansion" / f"{location}.json"
@@ -100,7 +102,7 @@ def _maps(dataroot: Path, locations: list[str], options: Options, report: Report
         from scenicq.importers.nuscenes_map import read_expansion  # noqa: PLC0415 - slow to load, and for maps
 
         def tell(element: str, problem: str, file: str = expansion.name) -> None:
-            report.left_out("map element", "map-invalid", f"{file}: element `{element}`: {problem}")
+            report.leave_out("map element", "map-invalid", f"{file}: element `{element}`: {problem}")
 
         maps[location] = read_expansion(expansion, tell, report, left_hand=location.startswith(_LEFT_HAND))
     return maps

@@ -16,7 +16,7 @@ from scenicq.importers.fields import InvalidError, whole
 from scenicq.importers.nuscenes_rows import Annotation
 from scenicq.store.columns import pick_rows, to_json
 
-__all__ = ["BoxReader", "Boxes", "headings", "is_unit", "joined", "norms_of", "vectors"]
+__all__ = ["BoxReader", "Boxes", "headings", "is_unit", "join_boxes", "norms_of", "vectors"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -24,7 +24,7 @@ class Boxes:
     """Annotations, one element or row each.
 
     Attributes:
-        tokens: Of the annotations.
+        tokens: Tokens of the annotations.
         samples, tracks: Numbers of the sample and of the instance, shape (n,).
         values: x, y, heading, width, length, height, z in metres and radians, shape (n, 7).
         attributes: What else is said, as JSON; None where there is nothing.
@@ -37,12 +37,12 @@ class Boxes:
     attributes: Sequence[str | None]
 
     def take(self, order: NDArray[np.intp]) -> Boxes:
-        """Those of some numbers, in their order."""
+        """Select boxes by their numbers, in that order."""
         return Boxes(**{each.name: pick_rows(getattr(self, each.name), order) for each in fields(self)})
 
 
-def joined(parts: Sequence[Boxes]) -> Boxes:
-    """One after the other."""
+def join_boxes(parts: Sequence[Boxes]) -> Boxes:
+    """Put boxes one after the other."""
     nothing = np.zeros(0, dtype=np.int64)
     parts = [Boxes((), nothing, nothing, np.zeros((0, 7)), ()), *parts]
     return Boxes(
@@ -73,7 +73,7 @@ class BoxReader:
         self._also = cache(self._text)
 
     def boxes(self, rows: Sequence[Annotation], tell: Callable[[int, str], None]) -> Boxes:
-        """Those of some annotations that are sound.
+        """Read the boxes of the annotations that are sound.
 
         Args:
             rows: The annotations.

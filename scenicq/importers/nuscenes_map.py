@@ -23,7 +23,7 @@ from scenicq.importers import fields
 from scenicq.importers.fields import InvalidError, Record
 from scenicq.importers.nuscenes_roads import link_roads
 from scenicq.importers.report import Report
-from scenicq.importers.specification import specification
+from scenicq.importers.specification import load_specification
 
 __all__ = ["arcline_points", "read_expansion"]
 
@@ -58,7 +58,7 @@ def read_expansion(
     """
     try:
         content = fields.record(fields.parse_json(path.read_bytes()), "the map")
-        specification("nuscenes-map").count_json(content, report)
+        load_specification("nuscenes-map").count_json(content, report)
         expansion = _Expansion(content, on_problem, report)
         return tuple(link_roads(list(expansion.features()), expansion.segments(), left_hand=left_hand))
     except OSError as error:
@@ -159,7 +159,7 @@ class _Expansion:
         for name, key in (("predecessors", "incoming"), ("successors", "outgoing")):
             others: list[str] = self._try(token, lambda key=key: self._linked(token, key)) or []
             properties[name] = [other for other in others if other in self._lanes]
-            self._report.not_read(
+            self._report.count_unread(
                 f"connectivity/*/{key} of lanes that are not there", len(others) - len(properties[name])
             )
         return properties

@@ -37,7 +37,7 @@ def link_roads(features: Sequence[MapFeature], segment_of: Mapping[str, str], *,
     """The features with neighbours, groups, roads and intersections linked to each other.
 
     Args:
-        features: Of one map; lanes have the property `layer`.
+        features: Elements of one map; lanes have the property `layer`.
         segment_of: The road segment of each road block.
         left_hand: Whether traffic keeps to the left; each lane then says so.
     """

@@ -8,7 +8,7 @@ from typing import Any
 from msgspec import DecodeError, Raw, Struct
 from msgspec.json import decode
 
-from scenicq.importers.specification import specification
+from scenicq.importers.specification import load_specification
 from scenicq.importers.typed_rows import ABSENT, FullText, Length, RowType, Words
 
 __all__ = [
@@ -159,7 +159,7 @@ def moment(value: Raw) -> float:
         return math.inf
 
 
-_KNOWN = specification("nuscenes")
+_KNOWN = load_specification("nuscenes")
 LOGS = RowType(LogRow, _KNOWN, "log", "token")
 SCENES = RowType(SceneRow, _KNOWN, "scene", "token")
 SAMPLES = RowType(SampleRow, _KNOWN, "sample", "token")

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.geometry.camera import Camera
-from scenicq.importers.base import ClassNames, Labels
+from scenicq.importers.base import ClassNames, LabelChecker
 from scenicq.importers.nuscenes_boxes import Boxes
 from scenicq.importers.report import Report
 from scenicq.store.columns import MemberColumns, RecordingColumns, to_json
@@ -46,7 +46,7 @@ class Instant:
 
     Attributes:
         place: File and line, for messages.
-        pose: Of the ego: x, y, heading, z.
+        pose: x, y, heading and z of the ego.
         sensors: Channel, file and camera, in order of the channels.
         boxes: How many of the scene's boxes are its.
     """
@@ -66,7 +66,7 @@ class SceneContent:
     Attributes:
         ahead_s: How far the local clock is ahead of UTC, seconds; None if unknown.
         instants: In order of time.
-        boxes: Of one instant after the other; the numbers of tracks are those of `tracks`.
+        boxes: Boxes of one instant after the other, with the numbers that tracks have in `tracks`.
         tracks: Token and class name of each track.
     """
 
@@ -107,16 +107,16 @@ class SceneReader:
     scenes: tuple[SceneContent, ...] = field(repr=False)
     classes: Mapping[str, str]
 
-    def recordings(self, labels: Labels, report: Report) -> Iterator[RecordingColumns]:
+    def recordings(self, labels: LabelChecker, report: Report) -> Iterator[RecordingColumns]:
         """The recordings in order of their names."""
         classes = ClassNames(self.classes, report)
         for scene in self.scenes:
             for instant in scene.instants:
                 if instant.pose is None:
                     message = f"{instant.place}: sample `{instant.token}` has no sound ego pose"
-                    report.left_out("label", "record-invalid", message)
+                    report.leave_out("label", "record-invalid", message)
             places = [instant.place for instant in scene.instants if instant.pose is not None]
-            if (found := labels.sound(_columns(scene, classes), places)) is not None:
+            if (found := labels.check_columns(_columns(scene, classes), places)) is not None:
                 yield found
 
 
@@ -206,7 +206,7 @@ def _velocities(tracks: NDArray[np.int64], times: NDArray[np.int64], xy: NDArray
 
     Args:
         tracks: Number of the track of each position, shape (n,).
-        times: Of each position, microseconds, in order.
+        times: Time of each position, microseconds, in order.
         xy: Positions, shape (n, 2).
     """
     order = np.argsort(tracks, kind="stable")

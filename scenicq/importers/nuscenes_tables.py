@@ -17,11 +17,11 @@ import numpy as np
 from scenicq.geometry.camera import Camera
 from scenicq.importers import fields
 from scenicq.importers import nuscenes_rows as tables
-from scenicq.importers.cameras import Mount, Pose, posed
+from scenicq.importers.cameras import Mount, Pose, place_camera
 from scenicq.importers.cameras import pose_of as vehicle_pose
 from scenicq.importers.fields import InvalidError, whole
 from scenicq.importers.json_tables import ElementBlock, read_list
-from scenicq.importers.nuscenes_boxes import Boxes, BoxReader, headings, joined, norms_of, vectors
+from scenicq.importers.nuscenes_boxes import Boxes, BoxReader, headings, join_boxes, norms_of, vectors
 from scenicq.importers.nuscenes_scenes import POSE_CHANNEL, Instant, SceneContent
 from scenicq.importers.recording_checks import tell_order
 from scenicq.importers.report import Report
@@ -156,7 +156,7 @@ class Tables:
         """Microseconds; some datasets in this layout have shares of one."""
         if isinstance(row.timestamp, float) and not row.timestamp.is_integer() and abs(row.timestamp) <= _LARGEST_TIME:
             message = "times are no whole numbers of microseconds; they are rounded"
-            self._report.assumed("sample", "rounded times", message)
+            self._report.assume("sample", "rounded times", message)
             return round(row.timestamp)
         return whole(row.timestamp, "timestamp")
 
@@ -197,15 +197,15 @@ class Tables:
                     images[token].append(_Image(sample, sensor, width, height))
 
             self._try("sensor file", place, add, f"sample_data `{row.token}`")
-        self._report.not_read("sample_data/sweeps", sweeps)
-        self._report.not_read("sample_data of samples that are not there", strays)
+        self._report.count_unread("sample_data/sweeps", sweeps)
+        self._report.count_unread("sample_data of samples that are not there", strays)
         for sample, (_, _, token) in nearest.items():
             if sample not in pose_of:
                 pose_of[sample] = token
                 message = (
                     f"no sound key frame of {POSE_CHANNEL}: the ego is where it was at the key frame nearest in time"
                 )
-                self._report.assumed("sample", "ego pose", message)
+                self._report.assume("sample", "ego pose", message)
         wanted = {*pose_of.values(), *images}
         rows: list[tables.EgoPose] = []
         for row, place in self._rows(tables.EGO_POSES, "ego pose"):
@@ -226,7 +226,7 @@ class Tables:
     def _add_camera(self, image: _Image, vehicle: Pose) -> None:
         channel, mount = image.sensor.channel, image.sensor.mount
         if mount is not None:
-            camera = posed(mount, vehicle, image.width, image.height)
+            camera = place_camera(mount, vehicle, image.width, image.height)
             self.sensors[image.sample][channel] = self.sensors[image.sample][channel][0], camera
 
     def _read_boxes(self) -> None:
@@ -238,7 +238,7 @@ class Tables:
         track_numbers = {token: number for number, token in enumerate(sorted(self._classes))}
         reader = BoxReader(sample_numbers, track_numbers, attributes, visible)
         path = self._folder / "sample_annotation.json"
-        self._boxes = joined(
+        self._boxes = join_boxes(
             [self._boxes_in(reader, path.name, block) for block in read_list(path, tables.ANNOTATIONS.many)]
         )
         self._tracks: list[tuple[str, str]] = [(token, self._classes[token]) for token in track_numbers]
@@ -269,7 +269,7 @@ class Tables:
         def tell(number: int, problem: str) -> None:
             place = _Place(file, block, numbers[number])
             message = f"{place}: annotation `{rows[number].token}`: {problem}"
-            self._report.left_out("object", "record-invalid", message)
+            self._report.leave_out("object", "record-invalid", message)
 
         return reader.boxes(rows, tell)
 
@@ -303,7 +303,7 @@ class Tables:
             except InvalidError as error:
                 name = f"{table.at} `{error.name}`: " if isinstance(error, RowError) and error.name else ""
                 name = name.replace("sample_annotation", "annotation")
-                self._report.left_out(what, "record-invalid", f"{_Place(file, block, number)}: {name}{error}")
+                self._report.leave_out(what, "record-invalid", f"{_Place(file, block, number)}: {name}{error}")
         return rows, numbers
 
     def _try(self, what: str, place: _Place, make: Callable[[], V], name: str = "") -> V | None:
@@ -311,7 +311,7 @@ class Tables:
             return make()
         except InvalidError as error:
             of = f"{name}: " if name else ""
-            self._report.left_out(what, "record-invalid", f"{place}: {of}{error}")
+            self._report.leave_out(what, "record-invalid", f"{place}: {of}{error}")
             return None
 
 

@@ -20,7 +20,7 @@ from xml.etree.ElementTree import Element
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.importers.report import Report
-from scenicq.importers.specification import specification
+from scenicq.importers.specification import load_specification
 from scenicq.importers.xml_tree import read_xml
 from scenicq.store.atomic_files import whole_file, write_whole
 
@@ -62,21 +62,21 @@ def _tell_left_out(file: Path, report: Report) -> None:
     """Count what the map has and Scenic's parser does not read; crossings and lanes are told."""
     root = read_xml(file)
     for lost in _dangling(root):
-        report.kept("map element", "map-invalid", f"{file.name}: {lost}")
-    known = specification("opendrive")
+        report.keep("map element", "map-invalid", f"{file.name}: {lost}")
+    known = load_specification("opendrive")
     known.count_xml(root, report)
     if any(each.get("type") == "crosswalk" for each in root.iter("object")):
         message = f"{file.name}: Scenic's parser reads no crossings; the map has some"
-        report.left_out("map element", "map-lacks", message)
+        report.leave_out("map element", "map-lacks", message)
     lanes = Counter(
         lane.get("type") or "" for side in _SIDES for lanes in root.iter(side) for lane in lanes.iter("lane")
     )
     for kind, count in sorted(lanes.items()):
         if not known.count(f"lane/@type/{kind}", report, count) and kind in _FOR_VEHICLES:
             message = f"{file.name}: Scenic's parser takes lanes of the type `{kind}` for no road; the map has {count}"
-            report.left_out("map element", "map-lacks", message)
+            report.leave_out("map element", "map-lacks", message)
     both = sum(lane.get("direction") == "both" for lane in root.iter("lane"))
-    report.not_read('lane/@direction="both"', both)
+    report.count_unread('lane/@direction="both"', both)
 
 
 def convert_xodr(path: Path, cache: Path, *, python: str = sys.executable, timeout_s: float = _TIMEOUT_S) -> Path:

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.importers import fields
-from scenicq.importers.base import ClassNames, OpenedSource, Options, read_maps
+from scenicq.importers.base import ClassNames, ImportOptions, OpenedSource, read_maps
 from scenicq.importers.by_file import RecordingFiles, by_file_source, missing
 from scenicq.importers.ego_choice import Moment, ego_facts, with_egos
 from scenicq.importers.fields import NO_MAP, InvalidError, Record
@@ -24,7 +24,7 @@ from scenicq.importers.openlabel_objects import FrameObjects, objects_of
 from scenicq.importers.openlabel_systems import Systems, first_vehicle
 from scenicq.importers.recording_checks import tell_order
 from scenicq.importers.report import Report
-from scenicq.importers.specification import specification
+from scenicq.importers.specification import load_specification
 from scenicq.importers.timestamps import microseconds
 from scenicq.store.classes import taxonomy
 from scenicq.store.labels import Label, LabelObject
@@ -46,7 +46,7 @@ class OpenLabel:
         """Whether the path is such a file or a folder of them."""
         return bool(openlabel_files(path))
 
-    def read(self, path: Path, options: Options, report: Report) -> OpenedSource:
+    def read(self, path: Path, options: ImportOptions, report: Report) -> OpenedSource:
         """Open files.
 
         Raises:
@@ -138,7 +138,7 @@ def _read_recording(place: RecordingFiles, classes: ClassNames, report: Report) 
     frames: list[_Frame] = []
     for file in place.files:
         content = _content(file)
-        specification("openlabel").count_json(content, report)
+        load_specification("openlabel").count_json(content, report)
         prefix = place.name if len(place.files) == 1 else f"{place.name}/{file.stem}"
         frames += _read_frames(content, file.name, prefix, classes, report)
     timed = _timed(frames, len(place.files) > 1, place.files[0].name, report)
@@ -169,7 +169,7 @@ def _read_frames(content: Record, file: str, prefix: str, classes: ClassNames, r
             frame = fields.record(frames[key], "it")
             properties = fields.optional_record(frame, "frame_properties")
             at_frame = Systems(systems, fields.optional_record(properties, "transforms"))
-            report.not_read("frames/*/frame_properties/transforms/* of no coordinate system", len(at_frame.unknown))
+            report.count_unread("frames/*/frame_properties/transforms/* of no coordinate system", len(at_frame.unknown))
             boxes = FrameObjects(at_frame, classes, report, where)
             members = objects_of(content, frame, int(key), boxes)
             time = _time(properties)
@@ -179,13 +179,13 @@ def _read_frames(content: Record, file: str, prefix: str, classes: ClassNames, r
                 ego = LabelObject("ego", "Car", "", pose.origin[0], pose.origin[1], pose.heading)
             moved = moved or vehicle in at_frame.used
         except InvalidError as error:
-            report.left_out("label", "record-invalid", f"{where}: {error}")
+            report.leave_out("label", "record-invalid", f"{where}: {error}")
             continue
         others = tuple(each for each in members if each.id != "ego")
         yield _Frame(f"{prefix}/{key}", int(key), time, others, ego, where)
     if not moved:
         message = f"{file}: no frame says where `{vehicle}` is; what is given in it seems to move as the ego does"
-        report.assumed("recording", "an ego at rest", message)
+        report.assume("recording", "an ego at rest", message)
 
 
 def _timed(frames: Sequence[_Frame], by_file: bool, file: str, report: Report) -> list[tuple[_Frame, int]]:
@@ -193,12 +193,12 @@ def _timed(frames: Sequence[_Frame], by_file: bool, file: str, report: Report) -
     if all(frame.time is None for frame in frames):
         message = f"{file}: no frame has a time; frames are taken to be 0.1 s apart"
         if len(frames) > 1:
-            report.assumed("recording", "steps of 0.1 s", message)
+            report.assume("recording", "steps of 0.1 s", message)
         return [(frame, (place if by_file else frame.number) * _STEP_US) for place, frame in enumerate(frames)]
     timed: list[tuple[_Frame, int]] = []
     for frame in frames:
         if frame.time is None:
-            report.left_out("label", "record-invalid", f"{frame.where}: it has no time, as others have")
+            report.leave_out("label", "record-invalid", f"{frame.where}: it has no time, as others have")
         else:
             timed.append((frame, frame.time))
     tell_order(file, [time for _, time in timed], report, numbered=True)

@@ -10,7 +10,7 @@ from typing import Any
 from scenicq.importers import fields
 from scenicq.importers.base import ClassNames
 from scenicq.importers.fields import InvalidError, Record
-from scenicq.importers.motion import euler, quaternion
+from scenicq.importers.motion import pose_of_euler_angles, pose_of_quaternion
 from scenicq.importers.openlabel_systems import Systems
 from scenicq.importers.recording_checks import radians
 from scenicq.importers.report import Report
@@ -29,7 +29,7 @@ class FrameObjects:
 
     Attributes:
         systems: Where they lie.
-        classes: Of their types.
+        classes: Classes of their types.
         report: Takes what is unsound.
         where: The frame, for messages.
     """
@@ -61,12 +61,12 @@ def objects_of(content: Record, frame: Record, number: int, boxes: FrameObjects)
             own = fields.optional_record(fields.optional_record(named, name), "object_data")
             member = _object(name, whole, own, boxes)
         except InvalidError as error:
-            boxes.report.left_out("object", "record-invalid", f"{boxes.where}: object `{name}`: {error}")
+            boxes.report.leave_out("object", "record-invalid", f"{boxes.where}: object `{name}`: {error}")
             continue
         if member is not None and member.id == "ego":
             egos += 1
             if egos > 1:
-                boxes.report.left_out("object", "record-invalid", f"{boxes.where}: object `{name}` is a second ego")
+                boxes.report.leave_out("object", "record-invalid", f"{boxes.where}: object `{name}` is a second ego")
                 continue
         if member is not None:
             found.append(member)
@@ -89,12 +89,12 @@ def _object(name: str, whole: Record, own: Record, boxes: FrameObjects) -> Label
     kind = next((text for each in (whole, own, static) if (text := fields.optional_text(each, "type"))), "unknown")
     called = next((text for each in (whole, own, static) if (text := fields.optional_text(each, "name"))), "")
     if _NO_OBJECT in (_plain(kind), _plain(called)):
-        boxes.report.not_read("objects/* of the type DontCare")
+        boxes.report.count_unread("objects/* of the type DontCare")
         return None
     cuboids = _elements(own, "cuboid") or _elements(static, "cuboid")
     if not cuboids:
         return None
-    boxes.report.not_read("objects/*/object_data/cuboid after the first", len(cuboids) - 1)
+    boxes.report.count_unread("objects/*/object_data/cuboid after the first", len(cuboids) - 1)
     cuboid = cuboids[0]
     is_ego = not _EGO.isdisjoint((_plain(kind), _plain(called), _plain(name)))
     system = fields.optional_text(cuboid, "coordinate_system") or fields.optional_text(whole, "coordinate_system")
@@ -130,7 +130,7 @@ def _attributes(data: Record, boxes: FrameObjects) -> Iterator[tuple[str, str | 
             if name is not None and isinstance(value, str | float | bool | int) and _is_finite(value):
                 yield name, value
             else:
-                boxes.report.not_read(f"objects/*/object_data/{kind} without a name or a finite value")
+                boxes.report.count_unread(f"objects/*/object_data/{kind} without a name or a finite value")
 
 
 def _is_finite(value: str | float | bool) -> bool:
@@ -143,14 +143,14 @@ def _box(cuboid: Record, system: str | None, systems: Systems, report: Report) -
     at = (values[0], values[1], values[2])
     if count == 10:
         x, y, z, w = values[3:7]
-        own = quaternion(w, x, y, z, at)
+        own = pose_of_quaternion(w, x, y, z, at)
     else:
         roll, pitch, yaw = (radians(angle, report) for angle in values[3:6])
-        own = euler(roll, pitch, yaw, at)
+        own = pose_of_euler_angles(roll, pitch, yaw, at)
     length, *others = values[-3:]
     if min(values[-3:]) <= 0:
         raise InvalidError("its size is not positive")
-    box = systems.pose(system).then(own)
+    box = systems.pose(system).compose(own)
     # In the frame of a camera the box stands on its y axis.
     upright = abs(box.z[2]) >= abs(box.y[2])
     width, height = others if upright else reversed(others)

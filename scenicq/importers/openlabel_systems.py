@@ -11,11 +11,11 @@ from dataclasses import replace
 
 from scenicq.importers import fields
 from scenicq.importers.fields import InvalidError, Record
-from scenicq.importers.motion import Rigid, matrix, quaternion, turns
+from scenicq.importers.motion import RigidTransform, pose_of_matrix, pose_of_quaternion, pose_of_rotations
 
 __all__ = ["Systems", "first_vehicle"]
 
-_IDENTITY = Rigid((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
+_IDENTITY = RigidTransform((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
 _SEQUENCE = "ZYX"
 """The axes of Euler angles where none are named, each about the turned body."""
 
@@ -37,7 +37,7 @@ class Systems:
         self.used: set[str] = set()
         self.unknown: list[str] = []
         self._systems = systems
-        self._moving: defaultdict[str, dict[str, Rigid]] = defaultdict(dict)
+        self._moving: defaultdict[str, dict[str, RigidTransform]] = defaultdict(dict)
         for key, value in transforms.items():
             entry = fields.record(value, f"transform `{key}`")
             source, target = fields.text(entry, "src"), fields.text(entry, "dst")
@@ -48,7 +48,7 @@ class Systems:
             self._moving[source][target] = pose
             self._moving[target].setdefault(source, pose.inverse())
 
-    def pose(self, name: str | None) -> Rigid:
+    def pose(self, name: str | None) -> RigidTransform:
         """A system, seen from the one without a parent.
 
         Raises:
@@ -66,7 +66,7 @@ class Systems:
             else:
                 higher = 1
                 step = _pose(fields.optional_record(fields.record(self._systems[line[0]], "it"), "pose_wrt_parent"))
-            pose = step.then(pose)
+            pose = step.compose(pose)
             line = line[higher:]
         return pose
 
@@ -90,20 +90,20 @@ def first_vehicle(systems: Record) -> str | None:
     return next((name for name in systems if name.lower().startswith(("vehicle", "ego"))), None)
 
 
-def _pose(entry: Record) -> Rigid:
+def _pose(entry: Record) -> RigidTransform:
     if entry.get("matrix4x4") is not None:
         values = fields.vector(entry, "matrix4x4", 16)
-        return matrix([values[start : start + 4] for start in (0, 4, 8)])
+        return pose_of_matrix([values[start : start + 4] for start in (0, 4, 8)])
     if not entry:
         return _IDENTITY
     origin = fields.vector(entry, "translation", 3) if entry.get("translation") is not None else (0.0, 0.0, 0.0)
     place = (origin[0], origin[1], origin[2])
     if entry.get("quaternion") is not None:
         x, y, z, w = fields.vector(entry, "quaternion", 4)
-        return quaternion(w, x, y, z, place)
+        return pose_of_quaternion(w, x, y, z, place)
     if entry.get("euler_angles") is not None:
         sequence = (fields.optional_text(entry, "sequence") or _SEQUENCE).upper()
         if len(sequence) != 3 or set(sequence) - set("XYZ"):
             raise InvalidError("`sequence` is not three of X, Y and Z")
-        return turns(sequence, fields.vector(entry, "euler_angles", 3), place)
+        return pose_of_rotations(sequence, fields.vector(entry, "euler_angles", 3), place)
     return replace(_IDENTITY, origin=place)

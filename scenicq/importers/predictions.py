@@ -168,7 +168,7 @@ class Predictions:
     """Detected boxes, in the order of their file.
 
     Attributes:
-        name: Of the file.
+        name: Name of the file.
         protocol: The rules that go with the format.
         frames: Names of the frames that the file speaks of, those without any box too.
         frame: Number of the frame of each box, shape (n,).

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from scenicq.importers.fields import InvalidError
 
-__all__ = ["Message", "integers", "parse", "signed"]
+__all__ = ["Message", "integers", "parse", "to_signed"]
 
 Value = int | float | memoryview
 Message = dict[int, list[Value]]
@@ -49,7 +49,7 @@ def parse(content: bytes | memoryview) -> Message:
     return found
 
 
-def signed(value: Value) -> int:
+def to_signed(value: Value) -> int:
     """A whole number; negative ones are in 64 bits."""
     if not isinstance(value, int):
         raise InvalidError("a field is not a whole number")
@@ -63,9 +63,9 @@ def integers(values: list[Value]) -> Iterator[int]:
             position = 0
             while position < len(value):
                 number, position = _varint(value, position)
-                yield signed(number)
+                yield to_signed(number)
         else:
-            yield signed(value)
+            yield to_signed(value)
 
 
 def _varint(view: memoryview, position: int) -> tuple[int, int]:

@@ -40,7 +40,7 @@ def radians(angle: float, report: Report) -> float:
     """
     if _LARGEST_ANGLE < abs(angle) < _NO_ANGLE:
         message = f"an angle of {angle:g} is taken for radians; angles in degrees are to be divided by 57.29578"
-        report.assumed("object", "angles in radians", message)
+        report.assume("object", "angles in radians", message)
     return angle
 
 
@@ -61,7 +61,7 @@ def tell_order(name: str, times_us: Sequence[int], report: Report, *, numbered: 
             f"in recording `{name}` time goes back {back} times in {len(times_us)} labels, first by "
             f"{-steps[place] / 1e6:g} s after label {place + 1}; labels are put in order of time"
         )
-        report.assumed("recording", f"order of times in {name}", message)
+        report.assume("recording", f"order of times in {name}", message)
 
 
 def tell_recording(columns: RecordingColumns, report: Report) -> None:
@@ -77,7 +77,7 @@ def tell_recording(columns: RecordingColumns, report: Report) -> None:
         message = (
             f"recording `{columns.name}` has a label every {step_us / 1e6:.3g} s; its times may not be microseconds"
         )
-        report.assumed("recording", "times in microseconds", message)
+        report.assume("recording", "times in microseconds", message)
     objects = columns.objects
     classes = Counter(zip(objects.track, objects.source_class, strict=True))
     kinds: defaultdict[str, list[tuple[str, int]]] = defaultdict(list)
@@ -88,7 +88,7 @@ def tell_recording(columns: RecordingColumns, report: Report) -> None:
         if len(found) > 1:
             listed = " and ".join(f"`{kind}` in {count} frames" for kind, count in sorted(found))
             message = f"track `{track}` of recording `{columns.name}` is {listed}"
-            report.assumed("track", "tracks that change their class", message)
+            report.assume("track", "tracks that change their class", message)
     _tell_jumps(columns, report)
 
 
@@ -108,4 +108,4 @@ def _tell_jumps(columns: RecordingColumns, report: Report) -> None:
             f"track `{objects.track[int(order[place])]}` of recording `{columns.name}` is {away_m[place]:.0f} m away "
             f"{passed_s[place]:g} s later; what is derived from its motion is as absurd"
         )
-        report.assumed("track", "tracks that jump", message)
+        report.assume("track", "tracks that jump", message)

@@ -74,7 +74,7 @@ def choose_importer(source: Path, name: str | None = None) -> Importer:
 
     Args:
         source: The source.
-        name: Of an importer, to choose it whatever it recognises.
+        name: Name of the importer to take, whatever it recognises; None to find one.
 
     Raises:
         DataError: `file-missing`, `option-invalid`, `dataset-unrecognised` or `dataset-ambiguous`.

@@ -1,4 +1,8 @@
-"""What an importer could not take as it is: told once, counted always, refused where the user wants it strict."""
+"""The report of an ingest: what was left out or assumed of a source, as messages and as counts.
+
+Every problem is counted, and the first ones of a kind are kept as messages. With `--strict`, the first problem is an
+error.
+"""
 
 from __future__ import annotations
 
@@ -13,21 +17,21 @@ from scenicq.importers.folders import readable
 from scenicq.store.manifest import LeftOut
 from scenicq.store.segment import SourceProblem
 
-__all__ = ["MOST_TOLD", "Report"]
+__all__ = ["MOST_MESSAGES", "Report"]
 
-MOST_TOLD = 20
-"""Messages of a kind that are kept."""
+MOST_MESSAGES = 20
+"""Messages that are kept of one kind of problem."""
 _MOST_ELEMENTS, _LONGEST_ELEMENT = 200, 200
-"""Kinds of elements that are counted apart, and characters of what they are called: a source may make up any number."""
+"""Kinds of elements that have counts of their own, and characters of their names: a source may make up any number."""
 _LONG = re.compile(r"`([^`]{80})[^`]{20,}`")
-"""A name of more characters than a message should show."""
+"""A name that is too long for a message."""
 
 
 class Report:
     """Collects the problems of one ingest.
 
-    Only the first messages of a kind are kept, so a source with a million bad records needs no more memory than one
-    with a few; the counts are complete.
+    Counts are complete. Messages are not, so that a source with a million bad records needs no more memory than one
+    with a few.
     """
 
     def __init__(self, *, strict: bool = False) -> None:
@@ -38,17 +42,17 @@ class Report:
         """
         self._strict = strict
         self._counts: Counter[tuple[bool, str, str, str]] = Counter()
-        self._told: list[SourceProblem] = []
-        self._told_of: Counter[tuple[str, str]] = Counter()
+        self._problems: list[SourceProblem] = []
+        self._messages_of: Counter[tuple[str, str]] = Counter()
         self._elements = 0
 
-    def left_out(self, what: str, code: str, message: str, *, hints: tuple[str, ...] = ()) -> None:
-        """Something is not taken.
+    def leave_out(self, what: str, code: str, message: str, *, hints: tuple[str, ...] = ()) -> None:
+        """Report that something is left out.
 
         Args:
-            what: "recording", "label", "object", "map element" ...
+            what: Its kind: "recording", "label", "object", "map element" ...
             code: A key of `CODES`.
-            message: The fact with its place: file, line, identifiers.
+            message: The fact with file, line and identifiers.
             hints: Statements that one can act on.
 
         Raises:
@@ -56,14 +60,14 @@ class Report:
         """
         self._add(SourceProblem(what, code, "", False, message, hints))
 
-    def kept(self, what: str, code: str, message: str, *, name: str = "", hints: tuple[str, ...] = ()) -> None:
-        """Something is taken with a defect.
+    def keep(self, what: str, code: str, message: str, *, name: str = "", hints: tuple[str, ...] = ()) -> None:
+        """Report that something is kept although it has a defect.
 
         Args:
-            what: What has the defect.
+            what: The kind of what has the defect.
             code: A key of `CODES`.
             message: The fact.
-            name: What several have in common, such as the unknown class: counted by it, told once.
+            name: What several have in common, such as the unknown class; they are counted together, with one message.
             hints: Statements that one can act on.
 
         Raises:
@@ -71,22 +75,22 @@ class Report:
         """
         self._add(SourceProblem(what, code, name, True, message, hints))
 
-    def assumed(self, what: str, name: str, message: str, *, hints: tuple[str, ...] = ()) -> None:
-        """Something that the source does not say is taken for granted: told once, and no problem of a strict ingest.
+    def assume(self, what: str, name: str, message: str, *, hints: tuple[str, ...] = ()) -> None:
+        """Report a value that is taken because the source says none; with one message, and no error if strict.
 
         Args:
-            what: "recording", "map" ...
-            name: What is assumed, in a few words.
-            message: The fact with its place.
+            what: The kind of what has it: "recording", "map" ...
+            name: The assumption, in a few words.
+            message: The fact with its file and line.
             hints: Statements that one can act on.
         """
         self._add(SourceProblem(what, "assumed", name, True, message, hints), strict=False)
 
-    def not_read(self, element: str, count: int = 1) -> None:
-        """Something that the source holds, sound as it is, is passed over: counted, and no problem of a strict ingest.
+    def count_unread(self, element: str, count: int = 1) -> None:
+        """Count elements that are sound and that a dataset cannot hold; no error if strict.
 
         Args:
-            element: What it is, in the words of the format.
+            element: Their name in the format.
             count: How many there are.
         """
         if not count:
@@ -98,16 +102,16 @@ class Report:
                 key = (False, "element", "not-read", "others")
         self._counts[key] += count
 
-    def merge(self, counts: Iterable[tuple[str, str, str, bool, int]], told: Iterable[SourceProblem]) -> None:
-        """Take in the `tally` and the `told` of another report, as if its problems had been reported here."""
+    def merge(self, counts: Iterable[tuple[str, str, str, bool, int]], problems: Iterable[SourceProblem]) -> None:
+        """Add the `tally` and the `problems` of another report, as if they had been reported here."""
         before = {key for key in self._counts if key[0] and key[3]}
-        for problem in told:
-            if _key(problem) not in before and self._told_of[problem.what, problem.code] < MOST_TOLD:
-                self._told.append(problem)
-                self._told_of[problem.what, problem.code] += 1
+        for problem in problems:
+            if _key(problem) not in before and self._messages_of[problem.what, problem.code] < MOST_MESSAGES:
+                self._problems.append(problem)
+                self._messages_of[problem.what, problem.code] += 1
         for what, code, name, kept, count in counts:
             if code == "not-read":
-                self.not_read(name, count)
+                self.count_unread(name, count)
             else:
                 self._counts[kept, what, code, name] += count
 
@@ -117,26 +121,26 @@ class Report:
         return tuple((entry.what, entry.code, entry.name, entry.kept, entry.count) for entry in self.counts)
 
     @property
-    def told(self) -> tuple[SourceProblem, ...]:
+    def problems(self) -> tuple[SourceProblem, ...]:
         """The first problems of each kind."""
-        return tuple(self._told)
+        return tuple(self._problems)
 
     @property
     def counts(self) -> tuple[LeftOut, ...]:
-        """How often each problem occurred, in an order that depends on nothing else."""
+        """How often each problem occurred, sorted."""
         return tuple(
             LeftOut(what, code, count, name, kept) for (kept, what, code, name), count in sorted(self._counts.items())
         )
 
     @property
     def diagnostics(self) -> tuple[Diagnostic, ...]:
-        """Warnings: the first of each kind, then how many there were where more than those were kept."""
+        """Warnings: the messages, then for each kind with more problems than messages how many there were."""
         more = [
             Diagnostic(code, f"{total} {what}s like this in all", severity="warning")
-            for (what, code), told in sorted(self._told_of.items())
-            if told >= MOST_TOLD and (total := self._total(what, code)) > MOST_TOLD
+            for (what, code), kept in sorted(self._messages_of.items())
+            if kept >= MOST_MESSAGES and (total := self._total(what, code)) > MOST_MESSAGES
         ]
-        return (*(Diagnostic(p.code, p.message, hints=p.hints, severity="warning") for p in self._told), *more)
+        return (*(Diagnostic(p.code, p.message, hints=p.hints, severity="warning") for p in self._problems), *more)
 
     def _total(self, what: str, code: str) -> int:
         return sum(count for (_, *key, _name), count in self._counts.items() if key == [what, code])
@@ -151,9 +155,9 @@ class Report:
         if known:
             return
         kind = problem.what, problem.code
-        if self._told_of[kind] < MOST_TOLD:
-            self._told_of[kind] += 1
-            self._told.append(problem)
+        if self._messages_of[kind] < MOST_MESSAGES:
+            self._messages_of[kind] += 1
+            self._problems.append(problem)
 
 
 def _key(problem: SourceProblem) -> tuple[bool, str, str, str]:

@@ -20,11 +20,11 @@ import numpy as np
 from msgspec import structs
 
 from scenicq.errors import DataError, Diagnostic
-from scenicq.garbage import without_collector
-from scenicq.importers.base import Entry, Labels, Reader
+from scenicq.garbage import pause_collector
+from scenicq.importers.base import LabelChecker, RecordingEntry, RecordingReader
 from scenicq.importers.recording_checks import tell_recording
-from scenicq.importers.report import MOST_TOLD, Report
-from scenicq.processes import Lost, Workers, as_many_as_pay
+from scenicq.importers.report import MOST_MESSAGES, Report
+from scenicq.processes import Lost, Workers, default_processes
 from scenicq.store.schema import SCHEMA_VERSION, SEGMENT_TABLES, ArrowTable
 from scenicq.store.segment import MapIndexes, Segment, SegmentWriter, SourceRecording
 
@@ -52,7 +52,7 @@ _COPIED = 65_536
 OnRecording = Callable[[str, int], None]
 """Called with a recording and its number of frames when it is written."""
 OnTold = Callable[[tuple[str, int]], None]
-"""The same for a worker, which tells what is then passed on."""
+"""What a worker calls instead: its message is passed on to `OnRecording`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +100,7 @@ class RecordingTask:
 
     name: str
     fingerprint: str
-    reader: Reader = field(repr=False)
+    reader: RecordingReader = field(repr=False)
     old: SegmentPlace | None = None
 
 
@@ -121,7 +121,7 @@ class Job:
     taken: frozenset[tuple[str, str]] = frozenset()
 
 
-def fingerprint(context: Sequence[str], entries: Sequence[Entry], taken: frozenset[tuple[str, str]]) -> str:
+def fingerprint(context: Sequence[str], entries: Sequence[RecordingEntry], taken: frozenset[tuple[str, str]]) -> str:
     """What changes with everything that a segment, or a recording of it, depends on, but for their maps.
 
     Which map a recording is on is known when it is read (`is_on_maps`).
@@ -182,7 +182,7 @@ def write_segments(
     """
     many = 1 if len(jobs) <= 1 else at_once
     if not many:
-        many = as_many_as_pay()
+        many = default_processes()
     if many > 1:
         yield from _write_apart(world, jobs, many, on_recording)
         return
@@ -217,7 +217,7 @@ def _write(world: World, job: Job, indexes: MapIndexes, on_recording: OnRecordin
     pieces: dict[str, SourceRecording] = {}
     messages: Counter[tuple[str, str]] = Counter()
     try:
-        with without_collector(), closing(_OldRows()) as old:
+        with pause_collector(), closing(_OldRows()) as old:
             writer.open()
             for place, shares in groupby(job.shares, lambda share: share.old):
                 together = list(shares)
@@ -228,7 +228,7 @@ def _write(world: World, job: Job, indexes: MapIndexes, on_recording: OnRecordin
                 for share, piece in zip(together, found, strict=True):
                     pieces[share.name] = piece
                     if messages.total() > _MOST_MESSAGES:
-                        few = tuple(each for each in piece.told if messages[each.what, each.code] < MOST_TOLD)
+                        few = tuple(each for each in piece.told if messages[each.what, each.code] < MOST_MESSAGES)
                         pieces[share.name] = structs.replace(piece, fingerprint="", told=few)
                     messages.update((each.what, each.code) for each in pieces[share.name].told)
             return writer.finish(job.fingerprint, pieces)
@@ -242,12 +242,12 @@ def _read(
     """Read a recording from the source."""
     report = Report(strict=world.strict)
     maps: dict[str, str] = {}
-    for found in share.reader.recordings(Labels(world.maps.keys(), report, job.taken), report):
+    for found in share.reader.recordings(LabelChecker(world.maps.keys(), report, job.taken), report):
         tell_recording(found, report)
         writer.add(found, indexes.of(found.map))
         on_recording(found.name, len(found.frames))
         maps[found.map] = world.digests.get(found.map, "")
-    return SourceRecording(share.fingerprint, report.tally, report.told, tuple(maps.items()))
+    return SourceRecording(share.fingerprint, report.tally, report.problems, tuple(maps.items()))
 
 
 def _copy(

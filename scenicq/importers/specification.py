@@ -1,10 +1,17 @@
-"""What the specification of a format lists, and what becomes of each field and kind of element here.
+"""What becomes of each field that a format's specification lists; what is left out is counted where it occurs.
 
-A file of `specifications/` gives for each path `read`, `left out` or `meaningless`, perhaps with a note after a colon.
-A path names the fields from the root down, with `*` for keys that the source makes up; members of a list have the path
-of the list, fields of protocol buffers end in their number, and `files/` begins patterns of files and folders. What is
-read without a path below it is read as a whole; ``as `PATH` `` in a note says that the fields are those of another
-path. What is left out, and what no specification lists, is counted where it occurs. `README.md` shows the lists.
+A file of `specifications/` says of each path whether it is `read`, `left out` or `meaningless` (it says nothing of a
+scene, so nobody misses it), perhaps with a note after a colon. What no file lists is left out.
+
+A path names the fields from the root down:
+
+- `*` stands for keys that the source makes up.
+- Members of a list have the path of the list.
+- Fields of protocol buffers end in their number, after a colon.
+- `files/` begins patterns of files and folders.
+
+What is read and has no path below it is read as a whole. The note ``as `PATH` `` says that the fields below are those
+of another path. `README.md` shows all lists.
 """
 
 from __future__ import annotations
@@ -21,99 +28,102 @@ from xml.etree.ElementTree import Element
 from scenicq.importers.protobuf import Message
 from scenicq.importers.report import Report
 
-__all__ = ["LEFT_OUT", "MEANINGLESS", "READ", "SPECIFICATIONS", "Specification", "specification"]
+__all__ = ["LEFT_OUT", "MEANINGLESS", "READ", "SPECIFICATIONS", "Specification", "load_specification"]
 
 READ, LEFT_OUT, MEANINGLESS = "read", "left out", "meaningless"
 SPECIFICATIONS = Path(__file__).with_name("specifications")
 _ALIAS = re.compile("as `([^`]+)`")
 _FILES = "files/"
-_NOTHING: tuple[object, ...] = (None, "", [], {})
-"""What says nothing of a field."""
+_EMPTY: tuple[object, ...] = (None, "", [], {})
+"""Values that count as if the field were not there."""
 
 
 class Specification:
     """The fields and kinds of elements of one format.
 
     Attributes:
-        entries: For each path `read`, `left out` or `meaningless`, and a note or "".
+        entries: Status and note of each path: `read`, `left out` or `meaningless`, and a text that may be empty.
     """
 
     def __init__(self, entries: Mapping[str, str]) -> None:
-        """Take the entries as a file of `specifications/` has them."""
+        """Take the entries of a file of `specifications/`: `STATUS` or `STATUS: NOTE` by path."""
         self.entries: dict[str, tuple[str, str]] = {}
         self._by_number: dict[str, dict[int, str]] = {}
-        self._below: dict[str, str] = {}
-        self._silent: dict[str, frozenset[str]] = {}
-        self._silent_numbers: dict[str, frozenset[int]] = {}
+        # where the fields of a path are listed: below itself, or below the path that its note names
+        self._fields_at: dict[str, str] = {}
+        self._uncounted: dict[str, frozenset[str]] = {}
+        self._uncounted_numbers: dict[str, frozenset[int]] = {}
         for path, text in entries.items():
             status, _, note = text.partition(": ")
             self.entries[path] = status, note
             if (alias := _ALIAS.fullmatch(note)) is not None:
-                self._below[path] = alias[1]
-            self._below.setdefault(path.rpartition("/")[0], path.rpartition("/")[0])
+                self._fields_at[path] = alias[1]
+            parent = path.rpartition("/")[0]
+            self._fields_at.setdefault(parent, parent)
 
-    def fate(self, path: str) -> str:
-        """`read`, `left out` or `meaningless`; what no specification lists is left out."""
+    def status(self, path: str) -> str:
+        """`read`, `left out` or `meaningless`; what is not listed is left out."""
         return self.entries.get(path, (LEFT_OUT, ""))[0]
 
     def count(self, path: str, report: Report, count: int = 1) -> bool:
-        """Count an element that is left out; whether it is read.
+        """Count elements if they are left out, and say whether they are read.
 
         Args:
-            path: Of the element.
-            report: Takes the count.
-            count: How many there are.
+            path: The path of the elements.
+            report: Adds up the counts.
+            count: The number of elements.
         """
-        fate = self.fate(path)
-        if fate == LEFT_OUT and count:
-            report.not_read(path, count)
-        return fate == READ
+        status = self.status(path)
+        if status == LEFT_OUT and count:
+            report.count_unread(path, count)
+        return status == READ
 
     def count_columns(self, table: str, columns: Iterable[str], report: Report, rows: int = 1) -> None:
-        """Count the columns of a table that are left out, with its rows."""
+        """Count each column of a table that is left out, once for each row."""
         for column in columns:
             self.count(f"{table}/{column}" if table else column, report, rows)
 
     def column_counter(self, table: str, report: Report) -> Callable[[Iterable[str], int], None]:
-        """What counts the columns of a table that are left out, from all names and how many rows it has."""
+        """A function that counts the columns left out of a table, from the names of all and the number of rows."""
         return lambda columns, rows: self.count_columns(table, columns, report, rows)
 
     def count_rows(self, rows: Iterable[Mapping[str, Any]], report: Report, at: str) -> None:
-        """Count the fields of records that are left out, those of records within them not.
+        """Count the fields of records that are left out, but no fields of records within them.
 
         Args:
-            rows: The records; what is null or empty in them says nothing.
-            report: Takes the counts.
-            at: Their path.
+            rows: The records; fields that are null or empty are not counted.
+            report: Adds up the counts.
+            at: The path of the records.
         """
-        silent = self._without_count(at)
+        uncounted = self._uncounted_names(at)
         for row in rows:
-            if not silent.issuperset(row):
+            if not uncounted.issuperset(row):
                 for key in row:
-                    if key not in silent and row[key] not in _NOTHING:
-                        self.count(self._child(at, key), report, _members(row[key]))
+                    if key not in uncounted and row[key] not in _EMPTY:
+                        self.count(self._child(at, key), report, _element_count(row[key]))
 
     def count_files(self, names: Iterable[str], report: Report) -> None:
         """Count files and folders that are left out.
 
         Args:
-            names: Of each, from the root of the source.
-            report: Takes the counts.
+            names: Their paths in the source.
+            report: Adds up the counts.
         """
         patterns = [path.removeprefix(_FILES) for path in self.entries if path.startswith(_FILES)]
         for name in names:
             path = PurePosixPath(name)
-            unlisted = str(path.with_name(f"*{path.suffix}")) if path.suffix else name
-            pattern = next((pattern for pattern in patterns if fnmatchcase(name, pattern)), unlisted)
+            # files that nothing lists are counted together by their suffix
+            by_suffix = str(path.with_name(f"*{path.suffix}")) if path.suffix else name
+            pattern = next((pattern for pattern in patterns if fnmatchcase(name, pattern)), by_suffix)
             self.count(f"{_FILES}{pattern}", report)
 
     def count_json(self, value: object, report: Report, at: str = "") -> None:
-        """Count what is left out of a JSON value.
+        """Count the fields of a JSON value that are left out, at every depth.
 
         Args:
-            value: The value; what is null or empty says nothing.
-            report: Takes the counts.
-            at: Its path.
+            value: The value; fields that are null or empty are not counted.
+            report: Adds up the counts.
+            at: The path of the value.
         """
         waiting: list[tuple[str, object]] = [(at, value)]
         while waiting:
@@ -121,21 +131,21 @@ class Specification:
             if isinstance(value, list):
                 waiting += [(path, each) for each in cast("list[object]", value) if isinstance(each, dict | list)]
             elif isinstance(value, dict):
-                silent = self._without_count(path)
+                uncounted = self._uncounted_names(path)
                 for key, member in cast("dict[str, Any]", value).items():
-                    if key in silent or member in _NOTHING:
+                    if key in uncounted or member in _EMPTY:
                         continue
                     child = self._child(path, key)
-                    if self.count(child, report, _members(member)) and (below := self._below.get(child)):
+                    if self.count(child, report, _element_count(member)) and (below := self._fields_at.get(child)):
                         waiting.append((below, member))
 
     def count_xml(self, element: Element, report: Report, at: str = "") -> None:
-        """Count what is left out of an XML element; attributes are below their element, with an `@`.
+        """Count what is left out of an XML element, at every depth; attributes are fields that begin with `@`.
 
         Args:
             element: The element.
-            report: Takes the counts.
-            at: Its path.
+            report: Adds up the counts.
+            at: The path of the element.
         """
         waiting = [(at, element)]
         while waiting:
@@ -144,47 +154,51 @@ class Specification:
                 self.count(f"{path}/@{name}" if path else f"@{name}", report)
             for child in element:
                 inner = f"{path}/{child.tag}" if path else child.tag
-                if self.count(inner, report) and (below := self._below.get(inner)):
+                if self.count(inner, report) and (below := self._fields_at.get(inner)):
                     waiting.append((below, child))
 
     def count_message(self, message: Message, report: Report, at: str = "") -> None:
-        """Count the fields of a message of protocol buffers that are left out, those of messages within it not.
+        """Count the fields of a message of protocol buffers that are left out, but no fields of messages within it.
 
         Args:
-            message: The message.
-            report: Takes the counts.
-            at: Its path.
+            message: The message, values by field numbers.
+            report: Adds up the counts.
+            at: The path of the message.
         """
         if at not in self._by_number:
-            named = {path.rpartition(":")[2]: path for path in self.entries if path.rpartition("/")[0] == at}
-            self._by_number[at] = {int(number): path for number, path in named.items() if number.isdigit()}
+            numbered = {path.rpartition(":")[2]: path for path in self._children(at)}
+            self._by_number[at] = {int(number): path for number, path in numbered.items() if number.isdigit()}
             known = self._by_number[at].items()
-            self._silent_numbers[at] = frozenset(number for number, path in known if self.fate(path) != LEFT_OUT)
-        if not self._silent_numbers[at].issuperset(message):
+            self._uncounted_numbers[at] = frozenset(number for number, path in known if self.status(path) != LEFT_OUT)
+        if not self._uncounted_numbers[at].issuperset(message):
             for number, values in message.items():
                 self.count(self._by_number[at].get(number, self._child(at, str(number))), report, len(values))
 
     def _child(self, at: str, key: str) -> str:
-        """The path of a field."""
-        child, free = (f"{at}/{key}", f"{at}/*") if at else (key, "*")
-        return free if child not in self.entries and free in self.entries else child
+        """The path of a field; with `*` where that is listed and the field is not."""
+        child, wildcard = (f"{at}/{key}", f"{at}/*") if at else (key, "*")
+        return wildcard if child not in self.entries and wildcard in self.entries else child
 
-    def _without_count(self, at: str) -> frozenset[str]:
-        """Names of the fields of a path with which there is nothing to do."""
-        if at not in self._silent:
-            children = [path for path in self.entries if path.rpartition("/")[0] == at and path not in self._below]
-            self._silent[at] = frozenset(path.rpartition("/")[2] for path in children if self.fate(path) != LEFT_OUT)
-        return self._silent[at]
+    def _children(self, at: str) -> list[str]:
+        """The paths listed directly below a path."""
+        return [path for path in self.entries if path.rpartition("/")[0] == at]
+
+    def _uncounted_names(self, at: str) -> frozenset[str]:
+        """The fields below a path that count nothing: neither are they left out, nor has one fields of its own."""
+        if at not in self._uncounted:
+            leaves = [path for path in self._children(at) if path not in self._fields_at]
+            self._uncounted[at] = frozenset(path.rpartition("/")[2] for path in leaves if self.status(path) != LEFT_OUT)
+        return self._uncounted[at]
 
 
-def _members(value: object) -> int:
-    """How many elements a field has: a list of objects has its members, all else is one."""
+def _element_count(value: object) -> int:
+    """How many elements a field counts as: a list of objects as its members, everything else as one."""
     if isinstance(value, list) and value and isinstance(value[0], dict):
         return len(cast("list[object]", value))
     return 1
 
 
 @cache
-def specification(name: str) -> Specification:
-    """That of a format of `specifications/`."""
+def load_specification(name: str) -> Specification:
+    """Load the specification of a format from `specifications/`."""
     return Specification(json.loads(SPECIFICATIONS.joinpath(f"{name}.json").read_bytes()))

@@ -14,15 +14,15 @@ from pathlib import Path
 
 from scenicq.errors import DataError
 from scenicq.geometry.features import MapFeature
-from scenicq.importers.base import ClassNames, OpenedSource, Options, read_maps
+from scenicq.importers.base import ClassNames, ImportOptions, OpenedSource, read_maps
 from scenicq.importers.by_file import RecordingFiles, by_file_source, map_sink, missing
 from scenicq.importers.fields import InvalidError
 from scenicq.importers.layouts import waymo_files
 from scenicq.importers.motion import heading_of_yaw
-from scenicq.importers.protobuf import Message, parse, signed
+from scenicq.importers.protobuf import Message, parse, to_signed
 from scenicq.importers.recording_checks import radians
 from scenicq.importers.report import Report
-from scenicq.importers.specification import specification
+from scenicq.importers.specification import load_specification
 from scenicq.importers.tfrecord import read_record, records
 from scenicq.importers.waymo_map import LANE_WIDTH_M, scenario_features
 from scenicq.store.classes import taxonomy
@@ -50,7 +50,7 @@ class Waymo:
         """Whether the path is such a file or a folder of them."""
         return bool(waymo_files(path))
 
-    def read(self, path: Path, options: Options, report: Report) -> OpenedSource:
+    def read(self, path: Path, options: ImportOptions, report: Report) -> OpenedSource:
         """Open files: their scenarios are listed and their maps are read; tracks are read in turn.
 
         Raises:
@@ -66,7 +66,7 @@ class Waymo:
                 _list_scenarios(file, path, maps, places, report)
             except DataError as error:
                 for diagnostic in error.diagnostics:
-                    report.left_out("file", diagnostic.code, diagnostic.message)
+                    report.leave_out("file", diagnostic.code, diagnostic.message)
         return by_file_source(
             f"waymo-{path.resolve().name}",
             maps,
@@ -96,7 +96,7 @@ def _list_scenarios(
                 raise InvalidError(f"has the scenario `{name}` again")
         except InvalidError as error:
             hints = () if content is None else _other_messages(content)
-            report.left_out("recording", "record-invalid", f"{where}: {error}", hints=hints)
+            report.leave_out("recording", "record-invalid", f"{where}: {error}", hints=hints)
             continue
         digest = hashlib.blake2b(content, digest_size=16).hexdigest()
         weight = len(content) // _OBJECT_BYTES
@@ -107,7 +107,7 @@ def _list_scenarios(
             kinds = {feature.kind for feature in maps[name]}
             if "lane" in kinds and "intersection" not in kinds:
                 message = f"{file.name}: scenario {name}: no lane is `interpolating`: its map has no intersection"
-                report.assumed("map", "no intersections", message)
+                report.assume("map", "no intersections", message)
 
 
 def _other_messages(content: bytes) -> tuple[str, ...]:
@@ -122,14 +122,14 @@ def _read_scenario(place: RecordingFiles, classes: ClassNames, report: Report) -
     try:
         scenario = parse(read_record(place.files[0], int(place.options[0])))
         times = [_real(value) for value in scenario.get(_TIMESTAMPS, [])]
-        ego_index = signed(scenario.get(_EGO, [-1])[0])
+        ego_index = to_signed(scenario.get(_EGO, [-1])[0])
         tracks = scenario.get(_TRACKS, [])
         if not 0 <= ego_index < len(tracks):
             raise InvalidError("`sdc_track_index` names no track")
     except InvalidError as error:
-        report.left_out("recording", "record-invalid", f"{where}: {error}")
+        report.leave_out("recording", "record-invalid", f"{where}: {error}")
         return []
-    specification("waymo").count_message(scenario, report)
+    load_specification("waymo").count_message(scenario, report)
     members: list[dict[int, LabelObject]] = []
     for number, value in enumerate(tracks):
         try:
@@ -137,13 +137,13 @@ def _read_scenario(place: RecordingFiles, classes: ClassNames, report: Report) -
                 raise InvalidError("it is not a message")
             members.append(_track(parse(value), number == ego_index, classes, report, f"{where}: track {number}"))
         except InvalidError as error:
-            report.left_out("track", "record-invalid", f"{where}: track {number}: {error}")
+            report.leave_out("track", "record-invalid", f"{where}: track {number}: {error}")
             members.append({})
     made: list[tuple[Label, str]] = []
     for step, time in enumerate(times):
         ego = members[ego_index].get(step)
         if ego is None:
-            report.left_out("label", "record-invalid", f"{where}: the ego is not valid at step {step}")
+            report.leave_out("label", "record-invalid", f"{where}: the ego is not valid at step {step}")
             continue
         others = tuple(track[step] for track in members if step in track and track[step] is not ego)
         frame = f"{place.name}/{step}"
@@ -152,10 +152,10 @@ def _read_scenario(place: RecordingFiles, classes: ClassNames, report: Report) -
 
 
 def _track(track: Message, is_ego: bool, classes: ClassNames, report: Report, where: str) -> dict[int, LabelObject]:
-    known = specification("waymo")
+    known = load_specification("waymo")
     known.count_message(track, report, _AT_TRACK)
-    kind = signed(track.get(2, [0])[0])
-    name = str(signed(track.get(1, [0])[0]))
+    kind = to_signed(track.get(2, [0])[0])
+    name = str(to_signed(track.get(1, [0])[0]))
     source_class = _KINDS.get(kind, "unset")
     found: dict[int, LabelObject] = {}
     for step, value in enumerate(track.get(3, [])):
@@ -170,7 +170,7 @@ def _track(track: Message, is_ego: bool, classes: ClassNames, report: Report, wh
             if any(at[key] <= 0 for key in ("length", "width", "height")):
                 raise InvalidError("its size is not positive")
         except InvalidError as error:
-            report.left_out("object", "record-invalid", f"{where}: step {step}: {error}")
+            report.leave_out("object", "record-invalid", f"{where}: step {step}: {error}")
             continue
         radians(at["heading"], report)
         found[step] = _object(name, source_class, is_ego, at, classes)

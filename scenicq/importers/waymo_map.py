@@ -18,9 +18,9 @@ from scenicq.geometry.features import MapFeature, ProblemSink
 from scenicq.importers.fields import InvalidError
 from scenicq.importers.lane_graph import BoundedLane, Points, lane_features, lengths_along, sound_area
 from scenicq.importers.lane_parts import Beside, cut_lanes
-from scenicq.importers.protobuf import Message, Value, integers, parse, signed
+from scenicq.importers.protobuf import Message, Value, integers, parse, to_signed
 from scenicq.importers.report import Report
-from scenicq.importers.specification import specification
+from scenicq.importers.specification import load_specification
 
 __all__ = ["LANE_WIDTH_M", "scenario_features"]
 
@@ -67,7 +67,7 @@ def scenario_features(messages: Sequence[Value], on_problem: ProblemSink, report
         name = ""
         try:
             feature = _message(value, report, _AT)
-            name = str(signed(feature.get(1, [0])[0]))
+            name = str(to_signed(feature.get(1, [0])[0]))
             if name in lanes or name in others:
                 raise InvalidError("the id is used twice")
             if 3 in feature:
@@ -116,7 +116,7 @@ def _cut(
 
 
 def _lane(name: str, lane: Message, line: Points, neighbours: Sequence[_Neighbour]) -> BoundedLane:
-    kind = signed(lane.get(2, [0])[0])
+    kind = to_signed(lane.get(2, [0])[0])
     width = _BIKE_LANE_WIDTH_M if kind == _BIKE_LANE else LANE_WIDTH_M
     line = _simplified(line)
     left, right = _offset(line, width / 2), _offset(line, -width / 2)
@@ -128,7 +128,7 @@ def _lane(name: str, lane: Message, line: Points, neighbours: Sequence[_Neighbou
         beside_right=next((each.lane for each in neighbours if not each.is_left), None),
         predecessors=tuple(str(other) for other in integers(lane.get(9, []))),
         successors=tuple(str(other) for other in integers(lane.get(10, []))),
-        in_intersection=signed(lane.get(3, [0])[0]) == 1,
+        in_intersection=to_signed(lane.get(3, [0])[0]) == 1,
         properties={"lane_type": _LANE_KINDS.get(kind, "undefined"), "nominal_width": width},
     )
 
@@ -137,9 +137,9 @@ def _neighbours(lane: Message, report: Report) -> Iterator[_Neighbour]:
     for number, side in ((11, "left"), (12, "right")):
         for value in lane.get(number, []):
             found = _message(value, report, f"{_AT_LANE}/{side}_neighbors:{number}")
-            places = [signed(found.get(field, [0])[0]) for field in (2, 3, 4, 5)]
+            places = [to_signed(found.get(field, [0])[0]) for field in (2, 3, 4, 5)]
             if 1 in found:
-                yield _Neighbour(str(signed(found[1][0])), side == "left", *places)
+                yield _Neighbour(str(to_signed(found[1][0])), side == "left", *places)
 
 
 def _message(value: Value, report: Report, at: str) -> Message:
@@ -147,7 +147,7 @@ def _message(value: Value, report: Report, at: str) -> Message:
     if not isinstance(value, memoryview):
         raise InvalidError("a field is not a message")
     message = parse(value)
-    specification("waymo").count_message(message, report, at)
+    load_specification("waymo").count_message(message, report, at)
     return message
 
 

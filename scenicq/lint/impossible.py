@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from scenicq.errors import Diagnostic
 from scenicq.forest.bounds import may_hold
-from scenicq.forest.inline import assemble
+from scenicq.forest.inline import inline_scenario
 from scenicq.forest.interpret import OnMap
 from scenicq.forest.nodes import Constant, Node
 from scenicq.forest.scenario import Requirement, Scenario, ScenarioObject
@@ -26,7 +26,7 @@ def impossible_requirements(scenarios: Sequence[Scenario], *, real: bool) -> lis
 
     Args:
         scenarios: The program as compiled against each map, none of them made ready.
-        real: Whether the maps are those that are meant; if not, what hangs on a map is not spoken of.
+        real: Whether the maps are those that are meant; if not, what depends on a map is not spoken of.
     """
     found = [dict.fromkeys(_impossible(each, real=real)) for each in scenarios]
     return [each for each in found[0] if all(each in others for others in found[1:])] if found else []
@@ -41,7 +41,7 @@ def _impossible(scenario: Scenario, *, real: bool) -> Iterator[Diagnostic]:
         requirements=tuple(each for each in scenario.requirements if not _is_about(each, noisy)),
         soft=(),
     )
-    for check in assemble(plain, frozenset()).checks:
+    for check in inline_scenario(plain, frozenset()).checks:
         if check.defined or check.built_in is not None or not (real or _is_free_of_maps(check.condition)):
             continue
         if not may_hold(check.condition):

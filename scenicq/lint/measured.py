@@ -12,8 +12,8 @@ from scenicq.lint.terms import (
     Values,
     compared_sides,
     is_angle,
+    literal_number,
     make_warning,
-    number,
     order_of,
     terms,
     text_of,
@@ -63,7 +63,7 @@ def _angles(node: ast.SyntaxNode, values: Values) -> Iterator[Diagnostic]:
             pass
     for place in places:
         for term in terms(place, values):
-            value = number(term)
+            value = literal_number(term)
             if value is not None and abs(value) > _FULL_TURN and not ast.is_phrase(term, phrases.DEG):
                 text = term.span.text
                 yield make_warning(
@@ -104,7 +104,7 @@ def _signed(nodes: list[ast.SyntaxNode]) -> Iterator[Diagnostic]:
         bounded = {text_of(each[end_at]) for each in pairs}
         for each in pairs:
             end, angle = each[end_at], each[angle_at]
-            size, text = number(end), text_of(angle)
+            size, text = literal_number(end), text_of(angle)
             if not isinstance(angle, ast.Phrase) or not is_angle(angle) or size is None or text in bounded:
                 continue
             if least < size < math.pi:

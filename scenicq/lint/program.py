@@ -40,7 +40,7 @@ def lint(
         source: The program, which compiles.
         compiled: The program over each map, as compiled or made ready; without the map where one was made up. What a
             requirement is on one map alone is not spoken of.
-        options: Of the matcher.
+        options: Options of the matcher.
         properties: Whether properties that no class has are named, too; with a dataset its labels say more.
     """
     scenarios = [(scenario.as_written or scenario, network) for scenario, network in compiled]

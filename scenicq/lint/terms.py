@@ -18,8 +18,8 @@ __all__ = [
     "compared_sides",
     "is_angle",
     "links",
+    "literal_number",
     "make_warning",
-    "number",
     "order_of",
     "set_once",
     "terms",
@@ -43,7 +43,7 @@ def text_of(node: ast.SyntaxNode) -> str:
     return " ".join(node.span.text.split())
 
 
-def number(node: ast.SyntaxNode) -> float | None:
+def literal_number(node: ast.SyntaxNode) -> float | None:
     """The value of a number that the text says outright."""
     match node:
         case ast.LiteralValue(value=bool()):
@@ -51,10 +51,10 @@ def number(node: ast.SyntaxNode) -> float | None:
         case ast.LiteralValue(value=int() | float() as value):
             return float(value)
         case ast.UnaryOp(operator="-" | "+" as sign):
-            inner = number(node.operand)
+            inner = literal_number(node.operand)
             return None if inner is None else -inner if sign == "-" else inner
         case ast.Phrase(row=phrases.DEG):
-            inner = number(node.given[0])
+            inner = literal_number(node.given[0])
             return None if inner is None else math.radians(inner)
         case _:
             return None
@@ -101,7 +101,7 @@ def terms(node: ast.SyntaxNode, values: Values) -> Iterator[ast.SyntaxNode]:
     stack, seen = [node], set[int]()
     while stack:
         each = stack.pop()
-        if number(each) is not None:
+        if literal_number(each) is not None:
             yield each
             continue
         if (value := _stands_for(each, values)) is not None and id(value) not in seen:

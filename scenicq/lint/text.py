@@ -17,8 +17,8 @@ from scenicq.lint.terms import (
     compared_sides,
     is_angle,
     links,
+    literal_number,
     make_warning,
-    number,
     set_once,
     terms,
     text_of,
@@ -114,7 +114,7 @@ def _two(node: ast.SyntaxNode) -> Iterator[Diagnostic]:
     """`Uniform` of two numbers on both sides of 0: a range through 0 may be meant."""
     match node:
         case ast.Call(function=ast.Name(id="Uniform"), arguments=(first, second)):
-            low, high = (number(each.value) for each in (first, second))
+            low, high = (literal_number(each.value) for each in (first, second))
             if low is not None and high is not None and low < 0 < high and (low, high) != (-1, 1):
                 if any(ast.is_phrase(each.value, phrases.DEG) for each in (first, second)):
                     return
@@ -156,7 +156,7 @@ def _units(node: ast.SyntaxNode) -> Iterator[Diagnostic]:
     comment = last[value.span.source.position(value.span.end - 1)[1] :].partition("#")[2]
     unit = _SPEEDS_ELSEWHERE.search(comment)
     said = {float(each.group()) for each in _DIGITS.finditer(comment)}
-    if unit is None or _SPEEDS_HERE.search(comment) or (said and said.isdisjoint(map(number, numbers))):
+    if unit is None or _SPEEDS_HERE.search(comment) or (said and said.isdisjoint(map(literal_number, numbers))):
         return
     factor = _IN_METRES_A_SECOND.get(unit.group().lower(), " / 3.6")
     yield make_warning(
@@ -181,7 +181,7 @@ def _speeds(node: ast.SyntaxNode, values: Values) -> Iterator[Diagnostic]:
         case _:
             pass
     for place in places:
-        found = [(value, term) for term in terms(place, values) if (value := number(term)) is not None]
+        found = [(value, term) for term in terms(place, values) if (value := literal_number(term)) is not None]
         for value, term in found:
             text = term.span.text
             if value > _FASTEST_MPS:
@@ -236,12 +236,12 @@ def _exact(node: ast.SyntaxNode) -> Iterator[Diagnostic]:
         if operator != "==" or _is_measured(left) == _is_measured(right):
             continue
         measured, asked = (left, right) if _is_measured(left) else (right, left)
-        if number(asked) is not None:
-            near = measured.span.text if number(asked) == 0 else f"({measured.span.text}) - {asked.span.text}"
+        if literal_number(asked) is not None:
+            near = measured.span.text if literal_number(asked) == 0 else f"({measured.span.text}) - {asked.span.text}"
             within = "5 deg" if is_angle(measured) else "0.5"
             yield make_warning(
                 "exact-number", f"`== {asked.span.text}` will almost never hold: measurements are not exact",
-                node.span, "no tolerance holds in requirements",
+                node.span, "tolerances do not apply in requirements",
                 f"`abs({near}) < {within}` asks for what is near it",
             )  # fmt: skip
 
@@ -249,7 +249,7 @@ def _exact(node: ast.SyntaxNode) -> Iterator[Diagnostic]:
 def _range(node: ast.SyntaxNode) -> Iterator[Diagnostic]:
     match node:
         case ast.Call(function=ast.Name(id=name)) if name in _RANGES and len(node.arguments) >= 2:
-            low, high = (number(argument.value) for argument in node.arguments[-2:])
+            low, high = (literal_number(argument.value) for argument in node.arguments[-2:])
             if low is not None and high is not None and low > high:
                 first, second = (argument.value.span.text for argument in node.arguments[-2:])
                 yield make_warning(

@@ -35,4 +35,4 @@ def correspondences(
         if not every_open:
             search.undecided = failure
             return
-        yield Finding(verdicts.open(label, search, failure), search, plan, failure.assignment)
+        yield Finding(verdicts.undecided(label, search, failure), search, plan, failure.assignment)

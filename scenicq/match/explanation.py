@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 from scenicq.forest.nodes import Identity, Value
 from scenicq.match.decide.decomposition import decide_decomposed
-from scenicq.match.decide.solver_step import encoded
-from scenicq.match.problem.conditioned import Item, conditioned
+from scenicq.match.decide.solver_step import encode_groups
+from scenicq.match.problem.conditioned import Item, condition_items
 from scenicq.match.problem.constraints import describe_constraint
 from scenicq.match.problem.evaluation import show_value
 from scenicq.match.problem.observation import observe
@@ -26,10 +26,10 @@ __all__ = [
     "Refuted",
     "Satisfied",
     "Undecided",
-    "conditioned",
+    "condition_items",
     "decide_decomposed",
     "describe_constraint",
-    "encoded",
+    "encode_groups",
     "observe",
     "show_value",
 ]

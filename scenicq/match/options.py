@@ -35,7 +35,7 @@ class MatchOptions:
         precision: The solver's precision (δ).
         ignore_params: Global parameters that are not compared.
         budget: Steps of the correspondence search for one label.
-        correspondences: Of one label, that are told where all are asked for.
+        correspondences: Correspondences that are reported of one label, at most, where all are asked for.
     """
 
     tolerance: Tolerance = field(default_factory=Tolerance)

@@ -70,7 +70,8 @@ class Unknown:
     """It was not decided whether the label matches.
 
     Attributes:
-        reason: "timeout", "precision", "crash", "budget" or what the solver cannot express.
+        reason: "unobserved", "timeout", "budget", "nonlinear", "precision", "unsupported", "crash" or "garbage"
+            (`docs/matching.md` says what each means), or a sentence.
         cause: The feature or requirement that was not decided.
         correspondence: The correspondence that may match.
     """

@@ -194,7 +194,7 @@ class Matches(Sequence[FrameResult]):
         return made
 
     def without_results(self) -> Matches:
-        """The same query, whose results are still to be found."""
+        """The query with none of its results found yet."""
         return Matches.restored(self.query, self.origin, None)
 
     def __reduce__(self) -> tuple[Callable[..., Matches], tuple[Query, str, list[Result] | None]]:
@@ -296,13 +296,13 @@ class Matches(Sequence[FrameResult]):
         return flat_table(self.to_arrow()).to_pandas()
 
     def shot_of(self, result: Result) -> tuple[Shot, Backdrop]:
-        """What a picture of a result shows: of an interval its first frame, with whoever plays the roles there."""
+        """What a picture of a result shows; an interval shows its first frame, with the objects in the roles there."""
         if result.interval is None:
             return self._shot(result.frame)
         return self._shot_in(self.query.dataset.label(result.frame), result)
 
     def _shot_in(self, label: Label, interval: Result) -> tuple[Shot, Backdrop]:
-        """A frame of an interval, with whoever plays the roles there."""
+        """A frame of an interval, with the objects in the roles there."""
         scenario = self.query.compiled_map(label.map).scenario
         return Shot(label, scenario, verdict_at(label, interval)), self._backdrop(label)
 

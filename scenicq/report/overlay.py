@@ -17,7 +17,7 @@ from scenicq.geometry.outlines import outline
 from scenicq.geometry.shapes import Bounds
 from scenicq.match.verdict import Match, Verdict
 from scenicq.report.outlines import allowed_headings, allowed_place, views
-from scenicq.report.scene import Role, box_of, observed_by
+from scenicq.report.scene import Role, box_of, observe_roles
 from scenicq.report.svg import Plane, area_path, element, escape, points_path
 
 __all__ = ["Blame", "blames", "draw_blame", "draw_overlay", "draw_witness"]
@@ -80,11 +80,11 @@ def draw_overlay(
     Args:
         scenario: The scenario.
         broken: What excludes the frame.
-        roles: Who plays whom.
+        roles: The label object of each role.
         plane: Where the picture lies.
         bounds: What is drawn, in metres.
     """
-    observed = observed_by(roles)
+    observed = observe_roles(roles)
     seen = (area_path(outline(view, bounds), plane) for view in views(scenario, observed))
     parts = [element("path", class_="view", d=area) for area in seen if area]
     for role in roles:
@@ -133,7 +133,7 @@ def draw_blame(broken: tuple[Blame, ...], roles: tuple[Role, ...], plane: Plane)
 
     Args:
         broken: What excludes the frame.
-        roles: Who plays whom.
+        roles: The label object of each role.
         plane: Where the picture lies.
     """
     parts: list[str] = []

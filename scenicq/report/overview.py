@@ -71,7 +71,7 @@ def funnel_section(funnel: Funnel, cut: str) -> Markup:
         steps.append(("frames that match the initial scene", funnel.over_time["starts"]))
         counted = [
             ("ways to give the objects tracks from there on", funnel.over_time["bindings"]),
-            ("of these ways cut off: the recording or a track ends before the program", funnel.over_time["cut off"]),
+            ("ways cut off, as the recording or a track ends before the program", funnel.over_time["cut off"]),
             ("intervals that match", funnel.matches),
             ("intervals that are unknown", funnel.unknowns),
         ]

@@ -20,7 +20,7 @@ from scenicq.report.backdrop import Backdrop
 from scenicq.report.distances import draw_distances, measured_distances
 from scenicq.report.overlay import Blame, blames, draw_blame, draw_overlay, draw_witness
 from scenicq.report.placement import Placement
-from scenicq.report.scene import Role, box_of, draw_object, draw_text, find_roles, observed_by
+from scenicq.report.scene import Role, box_of, draw_object, draw_text, find_roles, observe_roles
 from scenicq.report.svg import Plane, element, escape
 from scenicq.store.labels import Label
 
@@ -75,7 +75,7 @@ class Shot:
 
     @property
     def roles(self) -> tuple[Role, ...]:
-        """Who plays whom, as far as the verdict says."""
+        """The roles in the picture, as far as the verdict says."""
         if self.scenario is None:
             return ()
         if self.explanation is not None:
@@ -132,7 +132,7 @@ def view_of(label: Label, roles: tuple[Role, ...], half: float | None = None) ->
 
     Args:
         label: The label.
-        roles: Who plays whom.
+        roles: The label object of each role.
         half: Metres from the middle to the edge; chosen if None.
     """
     ego = label.ego
@@ -213,7 +213,7 @@ def draw_shot(shot: Shot, plane: Plane, view: View, letters: float = LETTERS) ->
     placement = Placement((west, east), (north, south))
     if scenario is not None:
         parts += [draw_witness(shot.verdict, roles, plane, bounds), draw_blame(broken, roles, plane)]
-        ways = measured_distances(scenario, observed_by(roles), view.drawn)
+        ways = measured_distances(scenario, observe_roles(roles), view.drawn)
         parts.append(draw_distances(ways, plane, placement, round(view.half * letters * _METRES)))
     parts += [draw_text(roles, plane, placement, round(view.half * letters)), _furniture(plane, view)]
     return "".join(parts)

@@ -19,7 +19,7 @@ from scenicq.report.svg import Plane, element, escape, points_path
 from scenicq.store.classes import class_matches
 from scenicq.store.labels import Label, LabelObject
 
-__all__ = ["COLOURS", "Role", "box_of", "draw_object", "draw_text", "find_roles", "observed_by"]
+__all__ = ["COLOURS", "Role", "box_of", "draw_object", "draw_text", "find_roles", "observe_roles"]
 
 COLOURS = 8
 """Colours that roles are told apart by, besides their names."""
@@ -67,7 +67,7 @@ def find_roles(scenario: Scenario, label: Label, correspondence: Mapping[str, st
     return tuple(found)
 
 
-def observed_by(roles: tuple[Role, ...]) -> Observation:
+def observe_roles(roles: tuple[Role, ...]) -> Observation:
     """What the label observes of the objects that are played."""
     return {(role.index, name): value for role in roles for name, value in observe(role.member).items()}
 

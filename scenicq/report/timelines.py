@@ -1,4 +1,4 @@
-"""Intervals in a report: their frames as a run, and under the slider a timeline of who did what and what held when."""
+"""Intervals in a report: their frames as a run, and under the slider a timeline of what roles did and what held."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from scenicq.query.execution.recorded_columns import show_cell
 from scenicq.query.execution.results import ModeRecord, Recorded, RecordedCell, Result
 from scenicq.query.execution.run import Query
 from scenicq.query.explain.bands import Band, bands_of, conditions_over
-from scenicq.query.explain.interval_explanation import placed
+from scenicq.query.explain.interval_explanation import locate_interval
 from scenicq.report.runs import FrameRun
 from scenicq.report.svg import element, escape
 from scenicq.report.templates import markup
@@ -58,7 +58,7 @@ def _at_sample(recorded: Mapping[str, Recorded], place: int) -> Mapping[str, Rec
 def _timeline(query: Query, result: Result) -> str:
     """What roles do in an interval, and its bands, as a picture; and curves of what the program records."""
     curves = [_curve(name, each.values) for name, each in (result.recorded or {}).items() if each.series]
-    scenario, tracks, interval = placed(query, result)
+    scenario, tracks, interval = locate_interval(query, result)
     bands = () if scenario.dynamics is None else bands_of(scenario, conditions_over(scenario, tracks, interval))
     times_us = tracks.times_us[interval.start : interval.end + 1].tolist()
     return _drawn(bands, [*_lanes(result.timeline or (), times_us)], [*filter(None, curves)])

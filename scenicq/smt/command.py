@@ -17,7 +17,7 @@ from typing import IO, Self
 
 from scenicq.errors import Diagnostic, SolverError
 from scenicq.limits import LIMITS
-from scenicq.processes import end_group, ended_after, leashed, limit_memory
+from scenicq.processes import end_group, kill_after, kill_on_exit, limit_memory
 from scenicq.refusals import refused_by_system
 from scenicq.smt.answer import Answer, NoAnswer, Sat
 from scenicq.smt.problem import Problem, holds
@@ -57,7 +57,7 @@ class SmtlibSolver:
 
     def check(self, problem: Problem, *, precision: float, timeout_s: float) -> Answer:
         """Decide a problem in a new process; see `Solver.check`."""
-        with leashed(self._words) as (words, leash), self._spawn(words, leash) as process:
+        with kill_on_exit(self._words) as (words, leash), self._spawn(words, leash) as process:
             text, expired = _converse(process, to_smtlib(problem, precision).encode(), timeout_s)
         if len(text) > LIMITS.command_reply_bytes:
             return NoAnswer("garbage")
@@ -117,7 +117,7 @@ def _converse(process: subprocess.Popen[bytes], script: bytes, timeout_s: float)
     assert process.stdout is not None
     writer = threading.Thread(target=_write, args=(process.stdin, script), daemon=True)
     try:
-        with ended_after(process, timeout_s) as expired:
+        with kill_after(process, timeout_s) as expired:
             writer.start()
             text = process.stdout.read(LIMITS.command_reply_bytes + 1)
             if len(text) > LIMITS.command_reply_bytes:

@@ -25,8 +25,8 @@ from scenicq.smt.region_membership import TermVector, disc
 from scenicq.smt.terms import FALSE, apply, compare, conjunction, disjunction
 from scenicq.smt.unknowns import Unknowns
 from scenicq.smt.value_codes import (
-    between,
-    same,
+    equals_observed,
+    in_interval,
     truth,
 )
 
@@ -117,16 +117,16 @@ def _item(item: Item, expressions: Expressions, boxes: Mapping[Identity, Box]) -
         x, y = cast(TermVector, code)
         dx, dy = apply(ArithmeticOp.SUB, x, observed[0]), apply(ArithmeticOp.SUB, y, observed[1])
         if target.shape == "box":
-            return conjunction([*between(dx, -target.a, target.a), *between(dy, -target.b, target.b)])
+            return conjunction([*in_interval(dx, -target.a, target.a), *in_interval(dy, -target.b, target.b)])
         return disc(dx, dy, target.a)
     if not isinstance(observed, float):
-        return same(code, observed)
+        return equals_observed(code, observed)
     if not is_term(code):
         return FALSE
     off = apply(ArithmeticOp.SUB, code, observed)
     if target.shape == "angle":
         return _near_angle(off, scalar_bounds(node, boxes), observed, target.a)
-    return conjunction(between(off, -target.a, target.a))
+    return conjunction(in_interval(off, -target.a, target.a))
 
 
 def _near_angle(off: Term, limits: tuple[float, float], observed: float, width: float) -> Formula:
@@ -134,10 +134,10 @@ def _near_angle(off: Term, limits: tuple[float, float], observed: float, width: 
     low, high = limits[0] - observed, limits[1] - observed
     if math.isfinite(low) and math.isfinite(high):
         turns = range(math.ceil((low - width) / math.tau), math.floor((high + width) / math.tau) + 1)
-        return disjunction(conjunction(between(off, math.tau * k - width, math.tau * k + width)) for k in turns)
+        return disjunction(conjunction(in_interval(off, math.tau * k - width, math.tau * k + width)) for k in turns)
     if width >= math.pi / 2:
         return compare(">=", apply(ArithmeticOp.COS, off), math.cos(min(width, math.pi)))
     sine = apply(ArithmeticOp.SIN, off)
     return conjunction(
-        [*between(sine, -math.sin(width), math.sin(width)), compare(">", apply(ArithmeticOp.COS, off), 0.0)]
+        [*in_interval(sine, -math.sin(width), math.sin(width)), compare(">", apply(ArithmeticOp.COS, off), 0.0)]
     )

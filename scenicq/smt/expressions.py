@@ -63,7 +63,7 @@ from scenicq.smt.distance_terms import BoxTerms, box_meets, boxes_meet, disc_mee
 from scenicq.smt.enclosing import box_holds
 from scenicq.smt.field import field_cells
 from scenicq.smt.problem import Formula, Term, is_formula, is_term
-from scenicq.smt.region_membership import TermVector, inside_region, picked
+from scenicq.smt.region_membership import TermVector, index_equals, inside_region
 from scenicq.smt.terms import FALSE, apply, compare, conjunction, disjunction, negation, number
 from scenicq.smt.unknowns import Unknowns
 from scenicq.smt.value_codes import (
@@ -75,7 +75,7 @@ from scenicq.smt.value_codes import (
     equal,
     is_box,
     known_region,
-    rotated,
+    rotate_vector,
 )
 
 __all__ = ["Expressions"]
@@ -139,7 +139,7 @@ class Expressions:
                 x, y = cast(TermVector, args[0])
                 return (apply(ArithmeticOp.MUL, x, terms[1]), apply(ArithmeticOp.MUL, y, terms[1]))
             case Rotate():
-                return rotated(cast(TermVector, args[0]), terms[1])
+                return rotate_vector(cast(TermVector, args[0]), terms[1])
             case Norm():
                 x, y = cast(TermVector, args[0])
                 return apply(
@@ -150,9 +150,9 @@ class Expressions:
                 x, y = cast(TermVector, args[0])
                 return apply(ArithmeticOp.ATAN2, apply(ArithmeticOp.NEG, x), y)
             case CourseCoordinate() | Measure() | LaneCourse() | Corridor() | AheadInLanes():
-                raise CannotEvaluate("a course that hangs on what no label shows")
+                raise CannotEvaluate("a course that depends on what no label shows")
             case Among():
-                raise CannotEvaluate("a condition on other label objects that hangs on what no label shows")
+                raise CannotEvaluate("a condition on other label objects that depends on what no label shows")
             case DirectionAt():
                 return self._direction(node, cast(TermVector, args[1]))
             case Compare():
@@ -226,7 +226,7 @@ class Expressions:
             return pair
         if all(is_formula(option) for option in defined):
             return cases(index, [option if is_formula(option) else FALSE for option in options])
-        return CodeChoice(tuple((picked(index, n), option) for n, option in enumerate(options)))
+        return CodeChoice(tuple((index_equals(index, n), option) for n, option in enumerate(options)))
 
     def _distance(self, node: Distance, point: TermVector) -> Term:
         outside, inner = distance_term(known_region(node.region), point, self._around(node.point))

@@ -44,12 +44,12 @@ from scenicq.geometry.shapes import Bounds
 from scenicq.smt.problem import Formula, Term, is_formula
 from scenicq.smt.terms import FALSE, TRUE, apply, compare, conjunction, disjunction, negation
 
-__all__ = ["TermVector", "convex_cell", "disc", "inside_region", "picked"]
+__all__ = ["TermVector", "convex_cell", "disc", "index_equals", "inside_region"]
 
 TermVector: TypeAlias = tuple[Term, Term]
 
 
-def picked(index: Term | Formula, number: int) -> Formula:
+def index_equals(index: Term | Formula, number: int) -> Formula:
     """That an index, known to be a whole number, is this one; wide of it, so that the opposite is robust, too.
 
     The index may also be a truth value: 0 is false and 1 is true.
@@ -251,6 +251,6 @@ def _inside(
             return conjunction([base, negation(removed)])
         case Select():
             index = cast("Term | Formula", code(region.index))
-            return disjunction(conjunction([picked(index, number), part]) for number, part in enumerate(parts))
+            return disjunction(conjunction([index_equals(index, number), part]) for number, part in enumerate(parts))
         case _:
             raise CannotEvaluate(f"a region given as {type(region).__name__}")

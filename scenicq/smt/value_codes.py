@@ -14,21 +14,21 @@ from scenicq.errors import CannotEvaluate
 from scenicq.forest.nodes import ArithmeticOp, CompareOp, Constant, LogicOp, Node, RectangleAt, Undefined, Value
 from scenicq.geometry.regions import Rectangle, Region
 from scenicq.smt.problem import Formula, Term, is_formula, is_term
-from scenicq.smt.region_membership import TermVector, picked
+from scenicq.smt.region_membership import TermVector, index_equals
 from scenicq.smt.terms import FALSE, TRUE, apply, compare, conjunction, disjunction, negation, number
 
 __all__ = [
     "CodeChoice",
-    "between",
     "cases",
     "compare_codes",
     "connect",
     "constant_code",
     "equal",
+    "equals_observed",
+    "in_interval",
     "is_box",
     "known_region",
-    "rotated",
-    "same",
+    "rotate_vector",
     "truth",
 ]
 
@@ -51,10 +51,10 @@ class CodeChoice:
     options: tuple[tuple[Formula, object], ...]
 
 
-def same(code: object, observed: Value) -> Formula:
+def equals_observed(code: object, observed: Value) -> Formula:
     """Whether a value that is no number is the one observed."""
     if isinstance(code, CodeChoice):
-        return disjunction(conjunction([where, same(value, observed)]) for where, value in code.options)
+        return disjunction(conjunction([where, equals_observed(value, observed)]) for where, value in code.options)
     if is_formula(code):
         return FALSE if not isinstance(observed, bool) else code if observed else negation(code)
     return TRUE if not is_term(code) and code == observed else FALSE
@@ -89,7 +89,7 @@ def truth(code: object) -> Formula:
     return TRUE if code else FALSE
 
 
-def between(term: Term, low: float, high: float) -> list[Formula]:
+def in_interval(term: Term, low: float, high: float) -> list[Formula]:
     """That a term lies in an interval."""
     return [compare("<=", low, term), compare("<=", term, high)]
 
@@ -101,10 +101,10 @@ def equal(left: Term, right: object) -> Formula:
 
 def cases(index: Term | Formula, options: Sequence[Formula]) -> Formula:
     """That the option holds which an index picks."""
-    return disjunction(conjunction([picked(index, number), option]) for number, option in enumerate(options))
+    return disjunction(conjunction([index_equals(index, number), option]) for number, option in enumerate(options))
 
 
-def rotated(vector: TermVector, angle: Term) -> TermVector:
+def rotate_vector(vector: TermVector, angle: Term) -> TermVector:
     """A vector turned counter-clockwise."""
     x, y = vector
     c, s = apply(ArithmeticOp.COS, angle), apply(ArithmeticOp.SIN, angle)

@@ -19,10 +19,10 @@ from pathlib import Path
 from types import TracebackType
 from typing import IO, Self
 
-from scenicq.budget import leave_out, uncounted
+from scenicq.budget import leave_out, stop_clock
 from scenicq.errors import Diagnostic, SolverError
 from scenicq.limits import LIMITS
-from scenicq.processes import end_group, ended_after
+from scenicq.processes import end_group, kill_after
 from scenicq.smt.answer import Answer, NoAnswer, Sat
 from scenicq.smt.problem import Problem, holds
 from scenicq.smt.worker import Request, Setup, read_answer, seconds_of
@@ -83,7 +83,7 @@ class WorkerSolver:
             self.close()
         greeting: dict[str, str] = {}
         for _ in range(LIMITS.worker_starts):
-            with uncounted():
+            with stop_clock():
                 greeting = self._spawn()
             if "ready" in greeting:
                 self._version, self._has_loaded = greeting["ready"], True
@@ -191,7 +191,7 @@ class WorkerSolver:
         requests, answers = _pipes(process)
         line = b""
         # a process that has ended neither reads nor writes
-        with ended_after(process, timeout_s) as expired, contextlib.suppress(OSError):
+        with kill_after(process, timeout_s) as expired, contextlib.suppress(OSError):
             requests.write(message)
             requests.flush()
             line = answers.readline(LIMITS.worker_answer_bytes + 1)

@@ -23,7 +23,7 @@ from scenicq.geometry.features import MapFeature
 from scenicq.geometry.map_traits import MapTraits
 from scenicq.geometry.network import Network
 from scenicq.store.frame_index import find_rows
-from scenicq.store.frame_names import ShortNames, find_frame, shortened
+from scenicq.store.frame_names import ShortNames, find_frame, name_shorteners
 from scenicq.store.in_memory import connect_in_memory
 from scenicq.store.labels import Label
 from scenicq.store.manifest import Manifest, read_manifest
@@ -257,7 +257,7 @@ class Dataset:
     def short_names(self) -> ShortNames:
         """Make the functions that cut names of frames and recordings; the short names are still found."""
         with closing(self.connect()) as connection, self.blamed():
-            return shortened(connection)
+            return name_shorteners(connection)
 
     def labels_at(self, part: int, first: int, end: int, *, motion: bool = True) -> Iterator[Label]:
         """Read a range of labels of one part, in order, as matching sees them: without heights, tilts and cameras.

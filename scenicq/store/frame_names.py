@@ -15,7 +15,7 @@ from scenicq.errors import DataError, Diagnostic
 if TYPE_CHECKING:
     import duckdb
 
-__all__ = ["ShortNames", "find_frame", "find_recording", "shortened"]
+__all__ = ["ShortNames", "find_frame", "find_recording", "name_shorteners"]
 
 _SHORTEST = 6
 _SHOWN = 5
@@ -80,7 +80,7 @@ class ShortNames:
     recording: Callable[[str], str]
 
 
-def shortened(connection: duckdb.DuckDBPyConnection) -> ShortNames:
+def name_shorteners(connection: duckdb.DuckDBPyConnection) -> ShortNames:
     """Make the functions that cut names so that `find_frame` and `find_recording` still find them.
 
     Names of frames that do not all have the same number of parts stay as they are.

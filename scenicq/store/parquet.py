@@ -78,7 +78,7 @@ class TableWriter:
             self._flush(self._pending_rows // self._row_group * self._row_group)
 
     def end_group(self, least: int) -> None:
-        """Let a row group end here, if it has so many rows: whoever looks for what follows reads no more than that.
+        """Let a row group end here, if it has so many rows: a search for what follows reads no more than that.
 
         Args:
             least: The fewest rows of a row group.

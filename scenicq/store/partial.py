@@ -1,10 +1,12 @@
-"""The hidden folder in which a dataset grows beside its target, and how it gets the target's name.
+"""The hidden folder in which an ingest writes a dataset before it takes the target's name.
 
-`.NAME.partial` belongs to the process that holds its lock, which the system takes away with the process. After a hard
-kill the folder stays, with the segments that were complete, for the next ingest of that target.
+The folder `.NAME.partial` belongs to the process that holds its lock; the system releases the lock when the process
+ends. After a hard kill the folder stays, with the segments that are complete, and the next ingest of that target goes
+on from there.
 
-A dataset that is there already gets the new files beside its own, which have other names, and then the new manifest in
-one step. Files that the new manifest does not name go when nobody reads the dataset, or else with the next ingest.
+If the target is a dataset already, the new files move into it beside the old ones, which have other names. Then the
+new manifest replaces the old one in one step. Files that it does not name are removed as soon as nobody reads the
+dataset, or by the next ingest.
 """
 
 from __future__ import annotations
@@ -35,10 +37,10 @@ _SCHEME = re.compile("[A-Za-z][A-Za-z0-9+.-]+:")
 
 
 class Partial:
-    """The folder of a dataset that is not finished."""
+    """The folder of a dataset that is not finished, held by a lock."""
 
     def __init__(self, target: Path) -> None:
-        """Name the folders; nothing happens yet."""
+        """Take the folder of the dataset to be; nothing happens on the disk yet."""
         self.target = Path(os.path.realpath(target))
         self.folder = self.target.with_name(f".{self.target.name}.partial")
         self._kept: list[Path] = []
@@ -46,26 +48,27 @@ class Partial:
         self._spare: Spare | None = None
 
     def open(self) -> None:
-        """Make or take over the folder.
+        """Make the folder, or take over one that a killed process left, and lock it.
 
         Raises:
             OSError: The place cannot be written.
             DataError: `target-exists` while another process writes there; `target-unwritable` where it is a link.
         """
         if self.folder.is_symlink():
-            raise _through_link(self.target, self.folder)
+            raise _link_error(self.target, self.folder)
         self._spare = Spare()
         try:
             while self._lock is None:
                 self.folder.mkdir(exist_ok=True)
-                self._lock = self._locked()
+                self._lock = self._take_lock()
             for link in find_links(self.folder):
                 link.unlink()  # what an earlier process left there is not ours to go on from
         except BaseException:
             self._abandon()
             raise
 
-    def _locked(self) -> IO[bytes] | None:
+    def _take_lock(self) -> IO[bytes] | None:
+        """Lock the folder; None if it was finished and renamed meanwhile."""
         path = self.folder / _LOCK
         file = path.open("wb")
         try:
@@ -75,20 +78,20 @@ class Partial:
                 if not path.exists() or path.stat().st_ino != os.fstat(file.fileno()).st_ino:
                     file.close()
                     return None
-            return file  # within: an interrupt may come here, too
+            return file  # inside the try: an interrupt that comes here must close the file, too
         except BlockingIOError as error:
             file.close()
             message = f"another ingest is writing {self.target}"
             raise DataError(Diagnostic("target-exists", message, hints=("wait until it ends",))) from error
         except BaseException:
-            file.close()  # which else holds the lock as long as anybody looks at the error
+            file.close()  # a traceback would keep the file open, and the lock with it
             raise
 
     def _abandon(self) -> None:
-        """Remove a folder that was made and is not gone on with, unless somebody holds it or has left something."""
+        """Remove the folder if it is empty and no other process holds it."""
         self._free_spare()
         with suppress(OSError, DataError):
-            self._lock = self._lock or self._locked()
+            self._lock = self._lock or self._take_lock()
             if self._lock is not None:
                 (self.folder / _LOCK).unlink()
                 self.folder.rmdir()
@@ -143,6 +146,7 @@ class Partial:
             sync_folder(self.target.parent)
 
     def _hand_over(self) -> None:
+        """Move the files into the dataset that is there, the manifest last."""
         folders = sorted({path.parent for path in self._kept})
         for name in folders:
             (self.target / name).mkdir(exist_ok=True)
@@ -171,13 +175,13 @@ class Partial:
             self._lock = None
 
 
-def _through_link(target: Path, link: Path) -> DataError:
+def _link_error(target: Path, link: Path) -> DataError:
     message = f"{target} cannot be written: {link} is a link, and nothing is written or removed through one"
     return DataError(Diagnostic("target-unwritable", message, hints=("put a folder in its place, or remove it",)))
 
 
 def _remove_others(folder: Path, files: set[Path], below: str = "") -> None:
-    """Remove everything in a folder, or in one below it, but some files, given relative to it."""
+    """Remove all files of a folder, or of one below it, except for some, which are relative to the folder."""
     for path in sorted((folder / below).rglob("*"), reverse=True):
         if path.is_dir() and not path.is_symlink():
             with suppress(OSError):
@@ -214,4 +218,4 @@ def check_target(target: Path, *, force: bool = False, update: bool = False) -> 
         hints = ("`--force` replaces it", "`--update` adds what is new in the source")
         raise DataError(Diagnostic("target-exists", f"the dataset {target} exists", hints=hints))
     for link in find_links(target):
-        raise _through_link(target, link)
+        raise _link_error(target, link)

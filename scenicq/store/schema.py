@@ -32,10 +32,10 @@ ArrowTable: TypeAlias = pa.Table
 ArrowArray: TypeAlias = pa.Array
 """A column of rows."""
 
-SCHEMA_VERSION = 7
+SCHEMA_VERSION = 8
 """Changes with every change of a table that a reader could notice."""
 
-UPGRADABLE = frozenset({2, 3, 4, 5, 6})
+UPGRADABLE = frozenset({2, 3, 4, 5, 6, 7})
 """Older versions of which `scenicq index` makes this one: it computes anew what is computed."""
 
 ADDED = {4: frozenset({"z", "pitch", "roll", "image_width", "image_height", "intrinsics", "camera_pose"})}
@@ -128,6 +128,8 @@ SCHEMAS: dict[str, pa.Schema] = {
             pa.field("ego_ahead", _REAL),  # *
             _required("ego_distance", _REAL),  # *
             pa.field("relative_heading", _REAL),  # * heading minus the ego's, in (-pi, pi]
+            # * along and beside the ego's course, with how much less and more that may be; null without an end
+            *(pa.field(f"ego_{axis}{end}", _REAL) for axis in ("along", "beside") for end in ("", "_less", "_more")),
             _required("road_directions", pa.list_(_REAL)),  # *
             pa.field("lane", _TEXT),  # *
             pa.field("last_lane", _REAL),  # *

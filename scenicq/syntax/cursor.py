@@ -1,4 +1,4 @@
-"""The parser's place in the tokens: look, move on, and say what is wrong."""
+"""The parser's position among the tokens: look ahead, move on, and fail with a diagnostic."""
 
 from __future__ import annotations
 
@@ -65,13 +65,13 @@ class Cursor:
         return True
 
     def expect(self, text: str, where: str, hint: str = "") -> Token:
-        """Go past the next token, which must read so; `where` says what it stands after."""
+        """Go past the next token, which must read so; `where` says after what."""
         if self.text != text:
             raise self.fail(f"`{text}` is missing {where}", label=self.found(), hint=hint)
         return self.advance()
 
     def name(self, what: str) -> Token:
-        """Go past the next token, which must be a name; `what` says of what."""
+        """Go past the next token, which must be a name; `what` says the name of what."""
         if self.token.kind == "keyword":
             raise self.fail(f"`{self.text}` cannot be {what}", label="this word is reserved")
         if self.token.kind != "name":
@@ -144,7 +144,7 @@ class Cursor:
         return ScenarioError(Diagnostic(code, message, span or self.here(), label, notes, hints))
 
     def enter(self) -> None:
-        """Count one more level; whoever calls this takes it off `depth` again."""
+        """Count one more level of nesting; the caller takes it off `depth` again."""
         self.depth += 1
         if self.depth > LIMITS.expression_nesting:
             raise self.fail("the expression is nested too deeply", code="budget-exceeded")

@@ -10,7 +10,7 @@ from scenicq.errors import Note, ScenarioError, Source, similar
 from scenicq.limits import LIMITS
 from scenicq.syntax import ast
 from scenicq.syntax.cursor import Cursor
-from scenicq.syntax.hints import phrase_hint, place_hint
+from scenicq.syntax.hints import phrase_hint, specifier_hint
 from scenicq.syntax.lexer import tokenize_part
 from scenicq.syntax.literals import Field, LiteralText, decode, number_value, split_format, string_parts
 from scenicq.syntax.phrases import (
@@ -525,7 +525,7 @@ class ExpressionParser(Cursor):
             message = f"`{self.text}` alone starts no specifier"
             return self.fail(message, hint=f"write `{close}`", code="unknown-specifier")
         hint = f"`{close}` is spelled similarly" if close else "a property is set by `with property value`"
-        hint = place_hint(self.text) or hint
+        hint = specifier_hint(self.text) or hint
         return self.fail(f"no specifier starts with `{self.text}`", hint=hint, code="unknown-specifier")
 
     def specifier(self) -> ast.Specifier:

@@ -1,28 +1,64 @@
-"""What people write in plain English where Scenic has other words: hints for places where the parser cannot go on."""
+"""Hints for authors who write plain English, or a unit, where Scenic has other words.
+
+The parser asks for one where it cannot go on: the word that it stumbles over, or one shortly before it, tells what was
+meant. Each table here is a vocabulary: the words that authors write, with the text of the hint.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from scenicq.syntax.tokens import Token
 
-__all__ = ["BIKE_LANES", "MOVES", "STANDS", "TURNS", "condition_hint", "phrase_hint", "place_hint", "unit_hint"]
+__all__ = [
+    "BIKE_LANES_HINT",
+    "MOVING_HINT",
+    "STANDING_HINT",
+    "TURNING_HINT",
+    "condition_hint",
+    "phrase_hint",
+    "specifier_hint",
+    "unit_hint",
+]
+
+
+class _Unit(NamedTuple):
+    """How to write a number in some unit.
+
+    Attributes:
+        convention: The unit that Scenic assumes for such numbers.
+        suffix: What follows a number to make it one of Scenic's, such as ` / 3.6`; empty if nothing has to.
+    """
+
+    convention: str
+    suffix: str
+
 
 _LENGTH, _SPEED, _TIME = "lengths are in metres", "speeds are in metres a second", "times are in seconds"
 _DEGREES, _RADIANS = "`deg` stands for degrees", "angles are in radians"
 _UNITS = {
-    "m meter meters metre metres": (_LENGTH, ""), "km kilometers kilometres": (_LENGTH, " * 1000"),
-    "cm": (_LENGTH, " / 100"), "ft feet": (_LENGTH, " * 0.3048"), "m/s mps": (_SPEED, ""),
-    "km/h kmh kph": (_SPEED, " / 3.6"), "mph": (_SPEED, " * 0.447"), "degree degrees degs": (_DEGREES, " deg"),
-    "rad radians": (_RADIANS, ""), "s sec secs second seconds": (_TIME, ""), "min minutes": (_TIME, " * 60"),
-}  # fmt: skip
-"""What numbers mean without a unit, by the units that people write, and what makes such a number of theirs."""
-_UNIT = {word: told for words, told in _UNITS.items() for word in words.split()}
+    name: unit
+    for names, unit in {
+        "m meter meters metre metres": _Unit(_LENGTH, ""),
+        "km kilometers kilometres": _Unit(_LENGTH, " * 1000"),
+        "cm": _Unit(_LENGTH, " / 100"),
+        "ft feet": _Unit(_LENGTH, " * 0.3048"),
+        "m/s mps": _Unit(_SPEED, ""),
+        "km/h kmh kph": _Unit(_SPEED, " / 3.6"),
+        "mph": _Unit(_SPEED, " * 0.447"),
+        "degree degrees degs": _Unit(_DEGREES, " deg"),
+        "rad radians": _Unit(_RADIANS, ""),
+        "s sec secs second seconds": _Unit(_TIME, ""),
+        "min minutes": _Unit(_TIME, " * 60"),
+    }.items()
+    for name in names.split()
+}
 
 _DISTANCE = "`(distance from a to b) < 10` compares a distance"
-STANDS, MOVES = "`X.speed < 0.5` asks whether X stands", "`X.speed > 1` asks whether X moves"
-TURNS = "`X.angularSpeed > 0.2` asks whether X turns left, `< -0.2` right"
-BIKE_LANES = "`[each._bikeLane for each in network.laneGroups if each._bikeLane]` are those that the map knows"
+STANDING_HINT, MOVING_HINT = "`X.speed < 0.5` asks whether X stands", "`X.speed > 1` asks whether X moves"
+TURNING_HINT = "`X.angularSpeed > 0.2` asks whether X turns left, `< -0.2` right"
+BIKE_LANES_HINT = "`[each._bikeLane for each in network.laneGroups if each._bikeLane]` are those that the map knows"
 _AHEAD = (
     "`along(ego, X) > 0` asks whether X is ahead on the ego's course (`from scenicq.labels import along`); "
     "`ahead of Y by Range(0, 20)` places a new object"
@@ -46,56 +82,62 @@ _BEYOND = (
     "`hides(X, Y)` asks whether X hides Y from the ego (`from scenicq.labels import hides`); "
     "`beyond X by Range(2, 30)` places a new object where X hides it"
 )
-_SAID = {
-    "between": "`5 < a < 10` asks whether a number is between two", "near": _DISTANCE, "within": _DISTANCE,
-    "close": _DISTANCE, "far": _DISTANCE, "turning": TURNS, "turns": TURNS, "stopped": STANDS, "parked": STANDS,
-    "stationary": STANDS, "standing": STANDS, "ahead": _AHEAD, "front": _AHEAD, "behind": _BEHIND, "left": _LEFT,
-    "back": _BEHIND,
-    "right": _RIGHT, "on": _INSIDE, "inside": _INSIDE, "onto": _INSIDE, "faces": _TOWARD, "facing": _TOWARD,
-    "sees": _SEES, "visible": _SEES, "then": _OVER_TIME, "after": _OVER_TIME, "before": _OVER_TIME,
-    "overtakes": _OVER_TIME, "passes": _OVER_TIME, "initial": _AT_FIRST, "initially": _AT_FIRST, "for": _HOW_LONG,
-    "occludes": _BEYOND, "hides": _BEYOND, "occluded": _BEYOND, "hidden": _BEYOND,
-}  # fmt: skip
-"""How a condition is said that people write with that word."""
-_MADE = {
+_IN_CONDITIONS = {
+    "between": "`5 < a < 10` asks whether a number is between two",
+    **dict.fromkeys(("near", "within", "close", "far"), _DISTANCE),
+    **dict.fromkeys(("turning", "turns"), TURNING_HINT),
+    **dict.fromkeys(("stopped", "parked", "stationary", "standing"), STANDING_HINT),
+    **dict.fromkeys(("ahead", "front"), _AHEAD),
+    **dict.fromkeys(("behind", "back"), _BEHIND),
+    "left": _LEFT,
+    "right": _RIGHT,
+    **dict.fromkeys(("on", "inside", "onto"), _INSIDE),
+    **dict.fromkeys(("faces", "facing"), _TOWARD),
+    **dict.fromkeys(("sees", "visible"), _SEES),
+    **dict.fromkeys(("then", "after", "before", "overtakes", "passes"), _OVER_TIME),
+    **dict.fromkeys(("initial", "initially"), _AT_FIRST),
+    "for": _HOW_LONG,
+    **dict.fromkeys(("occludes", "hides", "occluded", "hidden"), _BEYOND),
+}
+"""Hints for the words of `require` and `terminate when`."""
+_IN_OBJECTS = {
     "same": "`facing Range(-10, 10) deg relative to X.heading` is the direction of X",
     "opposite": "`facing Range(170, 190) deg relative to X.heading` is against the direction of X",
     "between": "`Range(a, b)` is an interval",
     "front": "`ahead of X by Range(0, 20)` places an object in front of another",
-}  # fmt: skip
-"""How an object is described that people describe with that word."""
-_FAR = "a requirement says how far: `require (distance from a to b) < 10`"
-_OUT = "a requirement says where it is not: `in everywhere` and `require not (a.position in road)`"
+}
+"""Hints for the words of all other statements, which describe objects."""
+_NEARBY = "a requirement limits the distance: `require (distance from a to b) < 10`"
+_OUTSIDE = "`in everywhere` with `require not (a.position in road)` keeps an object out of a region"
 _ASIDE = "`at X offset by Range(1, 6) @ Range(-5, 5)` is an area on the right of X"
-_PLACED = {
-    "near": _FAR, "within": _FAR, "close": _FAR, "off": _OUT, "outside": _OUT, "not": _OUT,
-    "next": _ASIDE, "beside": _ASIDE, "alongside": _ASIDE,
-}  # fmt: skip
-"""What people try to place objects with, and how Scenic says it."""
-_FURTHEST = 4
-"""Words before the place where the parser cannot go on that may say what was meant."""
+_IN_SPECIFIERS = {
+    **dict.fromkeys(("near", "within", "close"), _NEARBY),
+    **dict.fromkeys(("off", "outside", "not"), _OUTSIDE),
+    **dict.fromkeys(("next", "beside", "alongside"), _ASIDE),
+}
+"""Hints for words that start no specifier."""
+_WORDS_BACK = 4
+"""How many words before the one that the parser cannot use may tell what was meant."""
 
 
 def unit_hint(number: str, word: str) -> str:
-    """What to write for a number with a unit; nothing for a word that is none."""
-    told = _UNIT.get(word)
-    return f"{told[0]}: write `{number}{told[1]}`" if told else ""
+    """What to write for a number with a unit; "" where the word is no unit."""
+    unit = _UNITS.get(word)
+    return f"{unit.convention}: write `{number}{unit.suffix}`" if unit else ""
 
 
 def phrase_hint(tokens: Sequence[Token], index: int) -> str:
-    """What to write for English words around a token that continues nothing.
+    """The hint for English words around a token that the parser cannot use; "" where there is none.
 
     Args:
-        tokens: All of them.
-        index: The token that the parser cannot use.
-
-    Returns:
-        The hint, or nothing.
+        tokens: All tokens of the program.
+        index: Where the token stands among them.
     """
     word, before = tokens[index].text, tokens[max(0, index - 1)]
-    after = [each.text for each in tokens[index + 1 : index + 3]]
+    after = [token.text for token in tokens[index + 1 : index + 3]]
     if before.kind == "number":
         unit = word + "".join(after) if after[:1] == ["/"] else word
+        # `5..10` and `5 to 10` are meant as intervals
         end = word.lstrip(".") if word.startswith(".") else after[0] if word == "to" and after else ""
         if end.isdecimal():
             return f"`Range({before.text.rstrip('.')}, {end})` is an interval"
@@ -103,24 +145,24 @@ def phrase_hint(tokens: Sequence[Token], index: int) -> str:
             return hint
     if before.text == "distance":
         return "`distance from a to b` is the distance between two"
+    if word in _UNITS and before.text == ")":
+        convention, suffix = _UNITS[word]
+        return f"{convention}: write {f'`(...){suffix}`' if suffix else 'the number alone'}"
+    if word == "with" and after[:1] == [":"]:
+        return "`with speed 3, with width 2` sets two properties"
     start = index
     while start and tokens[start - 1].kind not in ("newline", "indent", "dedent"):
         start -= 1
-    if word in _UNIT and before.text == ")":
-        means, factor = _UNIT[word]
-        return f"{means}: write {f'`(...){factor}`' if factor else 'the number alone'}"
-    if word == "with" and after[:1] == [":"]:
-        return "`with speed 3, with width 2` sets two properties"
-    said = _SAID if tokens[start].text in ("require", "terminate") else _MADE
-    words = (token.text for token in tokens[max(start, index - _FURTHEST) : index + 1])
-    return next((said[each] for each in words if each in said), "")
+    hints = _IN_CONDITIONS if tokens[start].text in ("require", "terminate") else _IN_OBJECTS
+    words = (token.text for token in tokens[max(start, index - _WORDS_BACK) : index + 1])
+    return next((hints[each] for each in words if each in hints), "")
 
 
 def condition_hint(word: str) -> str:
-    """How the condition is said that people write with a word between two names; nothing for other words."""
-    return _SAID.get(word, "")
+    """How to write the condition that authors express by a word between two names; "" for other words."""
+    return _IN_CONDITIONS.get(word, "")
 
 
-def place_hint(word: str) -> str:
-    """How objects are placed that people place with a word that starts no specifier; nothing for other words."""
-    return _PLACED.get(word, "")
+def specifier_hint(word: str) -> str:
+    """How to place an object where authors write a word that starts no specifier; "" for other words."""
+    return _IN_SPECIFIERS.get(word, "")

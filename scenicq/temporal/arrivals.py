@@ -20,11 +20,11 @@ from scenicq.forest.scenario import Property, Scenario, ScenarioObject
 from scenicq.forest.simplify import roots_of
 from scenicq.forest.walk import leaves
 from scenicq.geometry.regions import Everywhere
-from scenicq.limits import LIMITS, exhausted
+from scenicq.limits import LIMITS, limit_exceeded
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.constraints import relevant_properties
-from scenicq.match.problem.preprocess import ready
+from scenicq.match.problem.preprocess import prepare_scenario
 from scenicq.match.verdict import Match, NoMatch
 from scenicq.number_ranges import expand_ranges
 from scenicq.smt.answer import Solver
@@ -40,7 +40,7 @@ __all__ = ["Arrivals", "LabelOf"]
 
 Members = NDArray[np.int64]
 LabelOf = Callable[[Scenario, Mapping[int, int], Sequence[frozenset[str]]], tuple[Label, Mapping[str, str]]]
-"""The label with those objects alone that play a role, of whom some properties are relevant; and who plays whom."""
+"""The label with only the objects that play a role, which properties are relevant, and the correspondence."""
 _AT_ONCE = 200_000
 """Places in memory."""
 
@@ -62,7 +62,7 @@ class _Scene:
 
     @property
     def scenario(self) -> Scenario:
-        """The scenario of those who are there then."""
+        """The scenario of the objects that are there then."""
         return self.search.matcher.scenario
 
 
@@ -127,7 +127,7 @@ class Arrivals:
             )  # fmt: skip
             said = [given.value for owner in each.objects for given in owner.properties.values()]
             drawn = {leaf.identity for leaf in leaves(*said, *(one.condition for one in each.requirements))}
-            search = StartSearch(Matcher(ready(scene), options, self.solver))
+            search = StartSearch(Matcher(prepare_scenario(scene), options, self.solver))
             end = first + len(each.objects)
             self._scenes.append(_Scene(search, first, end, not drawn & own))
             first = end
@@ -165,7 +165,7 @@ class Arrivals:
         starts = np.cumsum(counts) - counts
         repeats = counts[binding]
         if int(repeats.sum()) > LIMITS.arrival_combinations:
-            raise exhausted("arrival_combinations")
+            raise limit_exceeded("arrival_combinations")
         origin = np.repeat(np.arange(len(table)), repeats)
         combination = order[expand_ranges(starts[binding], repeats)]
         # who comes later is not over before
@@ -194,7 +194,7 @@ class Arrivals:
         low = np.searchsorted(lives.recording[order], recording)
         counts = np.searchsorted(lives.recording[order], recording, side="right") - low
         if int(counts.sum()) > LIMITS.arrival_combinations:
-            raise exhausted("arrival_combinations")
+            raise limit_exceeded("arrival_combinations")
         which = np.repeat(np.arange(len(of)), counts)
         life = order[expand_ranges(low, counts)]
         keeps = lives.last[life] > first_label[of[which]]
@@ -241,7 +241,7 @@ class Arrivals:
         Args:
             places: The places.
             bounds: Where each stretch begins, and where the last ends.
-            label: See `widened`.
+            label: See `Arrivals.widened`.
         """
         found: dict[int, Truth] = {}
         for arrival, scene in zip(self.scenario.arrivals, self._scenes, strict=True):
@@ -254,7 +254,7 @@ class Arrivals:
         return found
 
     def _truth(self, scene: _Scene, places: BoundSamples, label: LabelOf | None) -> Truth:
-        """Whether a scenario may begin at each place; it may not where those who come are not seen."""
+        """Whether a scenario may begin at each place; it may not where the objects that it makes are not seen."""
         found = np.full(len(places), FALSE)
         members = {index: places.members[index] for index in range(scene.end)}
         come = np.logical_and.reduce([members[index] >= 0 for index in range(scene.first, scene.end)])
@@ -289,7 +289,7 @@ class Arrivals:
         look()
         matcher = scene.search.rest
         shown, names = label(scene.scenario, members, relevant_properties(scene.scenario, self.match))
-        verdict = matcher.match(shown, given=dict(names))
+        verdict = matcher.match(shown, fixed_roles=dict(names))
         return int(TRUE if isinstance(verdict, Match) else FALSE if isinstance(verdict, NoMatch) else UNKNOWN)
 
 

@@ -1,7 +1,7 @@
 """Atoms over the samples of a binding: the value of a boolean expression at each sample, all at once.
 
 The one interface is `AtomColumns.truth`; nodes are interpreted in the domain of columns (`forest.column_domain`). A
-sample at which something that is read is not observed makes what hangs on it unknown, and nothing else. Where a field
+sample at which something that is read is not observed makes what depends on it unknown, and nothing else. Where a field
 allows several directions, any of them will do.
 """
 
@@ -43,7 +43,7 @@ from scenicq.forest.temporal import Atom
 from scenicq.forest.unobserved import certain_and_possible, is_only_observed
 from scenicq.forest.walk import children, is_leaf, leaves, postorder
 from scenicq.limits import LIMITS
-from scenicq.temporal.grouping import alike
+from scenicq.temporal.grouping import group_equal
 from scenicq.temporal.samples import FIXED, BoundSamples, Observed, is_moving
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
@@ -54,7 +54,7 @@ Numbers: TypeAlias = NDArray[np.float64]
 
 
 def reads_start(condition: Node) -> bool:
-    """Whether an expanded condition over time hangs on what was observed at the first sample."""
+    """Whether an expanded condition over time depends on what was observed at the first sample."""
     nodes = postorder((condition,))
     return any(isinstance(node, Feature) and not node.current and node.property not in FIXED for node in nodes)
 
@@ -68,7 +68,7 @@ def _is_none(_: Node) -> bool:
 
 
 class UnclearVariable(Exception):
-    """What a condition over time hangs on a random variable for is not known by arrays; the message says why."""
+    """What a condition over time depends on a random variable for is not known by arrays; the message says why."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,7 +138,7 @@ class AtomColumns:
         """The value of a condition at each sample, shape (n,).
 
         Raises:
-            UnclearVariable: It hangs on a random variable without a value.
+            UnclearVariable: It depends on a random variable without a value.
         """
         return self.truth_of(self.expanded(condition))
 
@@ -221,7 +221,7 @@ class AtomColumns:
         """The values of an expanded expression; None where a field allows several directions.
 
         Raises:
-            UnclearVariable: It hangs on a random variable without a value.
+            UnclearVariable: It depends on a random variable without a value.
         """
         counts: dict[int, NDArray[np.intp]] = {}
         found = self._evaluate(node, {}, counts)
@@ -231,7 +231,7 @@ class AtomColumns:
         """As `column`, with the first of several directions, and where a field allows several; shape (n,).
 
         Raises:
-            UnclearVariable: It hangs on a random variable without a value.
+            UnclearVariable: It depends on a random variable without a value.
         """
         counts: dict[int, NDArray[np.intp]] = {}
         found, several = self._evaluate(node, {}, counts), np.zeros(len(self.samples), np.bool_)
@@ -273,7 +273,7 @@ class AtomColumns:
             observed &= column.status == DEFINED
             for part in arrays_of(column.data):
                 _, codes = np.unique(part, return_inverse=True)
-                _, found = alike(found * (int(codes.max(initial=0)) + 1) + codes)
+                _, found = group_equal(found * (int(codes.max(initial=0)) + 1) + codes)
         return np.where(observed, found, -1)
 
     def _definition(self, feature: Feature) -> Node | None:

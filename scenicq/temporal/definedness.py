@@ -33,7 +33,7 @@ from scenicq.forest.value_numbers import is_total
 from scenicq.forest.walk import children, postorder
 from scenicq.geometry.fields import VectorField
 from scenicq.geometry.regions import PolygonSet
-from scenicq.temporal.folding import folded
+from scenicq.temporal.folding import fold_value
 
 __all__ = ["untrue"]
 
@@ -71,7 +71,7 @@ def untrue(condition: Node) -> Node | None:
         every = (node.op is LogicOp.OR) == asked.positive
         return None if len(known) < len(parts) else Logic(LogicOp.AND if every else LogicOp.OR, tuple(known))
 
-    return folded(_Asked(condition, positive=True), below, opposite)
+    return fold_value(_Asked(condition, positive=True), below, opposite)
 
 
 @dataclass(frozen=True, slots=True)

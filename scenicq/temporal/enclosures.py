@@ -1,6 +1,6 @@
 """What conditions over time can be where of what is hidden in them only bounds are known.
 
-A number or a point that hangs on random variables, and on nothing that changes over time, is the same at all samples.
+A number or a point that depends on random variables, and on nothing that changes over time, is the same at all samples.
 Bounds of it, however they are found, bound what conditions can be at each sample, for all samples at once
 (`forest.intervals` over columns).
 """
@@ -32,7 +32,7 @@ Bounds = tuple[float, float]
 
 
 def _hanging(conditions: Sequence[Node]) -> tuple[set[int], set[int]]:
-    """The ids of the nodes that hang on random variables, and of those that hang on what changes over time."""
+    """The ids of the nodes that depend on random variables, and of those that depend on what changes over time."""
     hidden: set[int] = set()
     changing: set[int] = set()
     for node in postorder(tuple(conditions)):
@@ -45,7 +45,7 @@ def _hanging(conditions: Sequence[Node]) -> tuple[set[int], set[int]]:
 
 
 def unchanging(conditions: Sequence[Node]) -> list[Node]:
-    """The outermost numbers and points that hang on random variables, and on nothing that changes over time.
+    """The outermost numbers and points that depend on random variables, and on nothing that changes over time.
 
     Args:
         conditions: Expanded conditions.

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Sequence
 from typing import TypeVar
 
-__all__ = ["folded"]
+__all__ = ["fold_value"]
 
 K = TypeVar("K", bound=Hashable)
 V = TypeVar("V")
 
 
-def folded(root: K, below: Callable[[K], Sequence[K]], combine: Callable[[K, list[V]], V]) -> V:
+def fold_value(root: K, below: Callable[[K], Sequence[K]], combine: Callable[[K, list[V]], V]) -> V:
     """The value of something that is made of others.
 
     Args:

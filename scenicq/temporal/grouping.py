@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["alike", "distinct", "groups", "values_of"]
+__all__ = ["distinct", "group_equal", "groups", "values_of"]
 
 Places = NDArray[np.int64]
 
@@ -39,7 +39,7 @@ def distinct(places: Places, size: int) -> Places:
     return np.flatnonzero(there)
 
 
-def alike(code: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def group_equal(code: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """For each of the distinct numbers a place that has it, and for each place which of them is its own."""
     size = int(code.max(initial=0)) + 1
     if size > 4 * len(code) + 1024:

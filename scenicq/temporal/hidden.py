@@ -1,4 +1,4 @@
-"""Random variables of the scene that conditions over time hang on, and comparisons that are affine in them.
+"""Random variables of the scene that conditions over time depend on, and comparisons that are affine in them.
 
 A variable is drawn once, so all samples see one value of it. A comparison that is affine in it changes its outcome at
 one value for each sample, its cut (`hidden_conditions`).
@@ -39,7 +39,15 @@ from scenicq.forest.nodes import (
 from scenicq.forest.walk import children, leaves, postorder, transform
 from scenicq.temporal.atoms import AtomColumns, UnclearVariable
 
-__all__ = ["affine_sides", "comparisons_of", "has_cuts", "inside", "possibly", "random_variables", "support"]
+__all__ = [
+    "affine_sides",
+    "comparisons_of",
+    "has_cuts",
+    "necessary_condition",
+    "random_variables",
+    "support",
+    "value_between",
+]
 
 
 def random_variables(conditions: Iterable[Node]) -> list[Leaf]:
@@ -77,7 +85,7 @@ def support(leaf: Leaf) -> tuple[float, float]:
 
 
 def comparisons_of(leaf: Leaf, conditions: Sequence[Node]) -> Iterator[Compare]:
-    """The comparisons that hang on a variable."""
+    """The comparisons that depend on a variable."""
     for node in postorder(tuple(conditions)):
         if not any(_hangs_on(child, leaf) for child in children(node)):
             continue
@@ -113,7 +121,7 @@ def has_cuts(condition: Node) -> bool:
     )
 
 
-def possibly(condition: Node) -> Node | None:
+def necessary_condition(condition: Node) -> Node | None:
     """What holds wherever a condition does for some values of random variables; None if that is not known.
 
     A comparison that is affine in a bounded number holds for some value of it if it does for the least or the greatest.
@@ -179,7 +187,7 @@ def affine_sides(
     return sides[0], sides[1] - sides[0], unknown
 
 
-def inside(low: float, high: float) -> float:
+def value_between(low: float, high: float) -> float:
     """A value between two, of which one or both may be infinite."""
     if math.isinf(low) and math.isinf(high):
         return 0.0

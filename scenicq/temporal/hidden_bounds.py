@@ -52,7 +52,7 @@ class PossibleValues:
         Args:
             machine: The program.
             stretches: Stretches with their starts.
-            atom: The value of an atom that hangs on no hidden number at each place.
+            atom: The value of an atom that depends on no hidden number at each place.
             hidden: The conditions that do.
         """
         m = len(stretches.starts)

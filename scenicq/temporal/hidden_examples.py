@@ -1,12 +1,17 @@
-"""Runs whose conditions hang on random variables in ways that no cells tell apart, such as a hidden point.
+"""Runs whose conditions depend on random variables without intervals to split, such as a hidden point.
 
-The matcher gives one example of values with which the label at the start matches. With it every condition has a value
-at every sample. The matcher is asked for bounds of the numbers and points among them that do not change over time;
-where these tell what a condition is (`enclosures`), it is certain. For the others the matcher is asked for values with
-which some turn out otherwise, many at once, then fewer. What no values turn is certain, however the variables come out.
-What some turn is assumed to hold and not to hold, one after the other from the first sample on, where the matcher has
-an example of all that is assumed, until the run is decided: so all that can become of it is found, each with values
-that make it so.
+An *example* is values of the variables with which the label at the start matches; with it, every condition has a truth
+at every sample. The question is which other truths other values can give:
+
+1. The matcher gives a first example.
+2. It is asked for bounds of the numbers and points that do not change over time. Where the bounds decide a condition
+   (`enclosures`), its truth is *certain*.
+3. It is asked for examples that give some other conditions another truth: many at once, then fewer. Where there is no
+   such example, the truth is certain; else it is *open*.
+4. Open conditions are assumed true and assumed false, from the first sample on, as long as an example agrees with all
+   assumptions, until the run is decided.
+
+So every outcome of the run is found, each with values that lead to it.
 """
 
 from __future__ import annotations
@@ -55,33 +60,33 @@ from scenicq.temporal.enclosures import Bounds, certainly, unchanging
 from scenicq.temporal.runs import Runs
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
-__all__ = ["Example", "Examples", "InitialScene", "Remembered"]
+__all__ = ["Example", "Examples", "InitialScene", "StartLabel"]
 
-Remembered = tuple[Label, Mapping[str, str]]
+StartLabel = tuple[Label, Mapping[str, str]]
 """The label of a start, and its correspondence."""
 
 
 _REACHES = (1.0, 4.0, 16.0)
 """How far beyond examples a number or a coordinate may be, tried in this order: in metres, radians, ..."""
 _CLOSE = 1 / 8
-"""The part of the way to the examples that bounds are away from them, where nearer ones are looked for."""
+"""Bounds are halved until their distance from the examples is this share of what it was."""
 _SHARE = 0.2
 """The share of the time for one start that one question about bounds may take."""
 
 _Place = tuple[int, int]
-"""The number of a condition and a sample."""
+"""The number of a condition, and a sample."""
 _Case = tuple[Mapping[int, Truth], tuple[Node, ...], Sequence["Example"]]
-"""What conditions are, what is assumed of them, and examples for which it is so."""
+"""The truths of conditions, the assumptions, and the examples that agree with them."""
 
 
 @dataclass(slots=True)
 class InitialScene:
-    """What the labels of starts are matched with, besides what the program says of time.
+    """The initial scene of a program, which the labels of starts must match.
 
     Attributes:
-        scenario: The scenario; what it says of time is left out.
+        scenario: The scenario; its conditions over time are left out.
         match: Options of the matcher.
-        solver: Decides what is not decided otherwise.
+        solver: Decides what nothing of our own decides.
     """
 
     scenario: Scenario
@@ -89,8 +94,8 @@ class InitialScene:
     solver: Solver | None
     _plain: Matcher | None = None
 
-    def examine(self, start: Remembered, wanted: Node | None) -> Finding:
-        """Whether the label of a start matches with its correspondence, and a condition about it holds besides."""
+    def examine(self, start: StartLabel, wanted: Node | None) -> Finding:
+        """Match the label of a start with its correspondence, under one more condition if there is one."""
         if wanted is None:
             self._plain = self._plain or self._matcher(self.scenario.requirements)
             matcher = self._plain
@@ -108,9 +113,9 @@ class Example:
     """Values of random variables with which a label matches.
 
     Attributes:
-        values: The values of the variables of conditions over time.
-        witness: The values of all, by their place in the program.
-        truth: What they make of each condition that hangs on them, at each sample.
+        values: The values of the variables that conditions over time read.
+        witness: The values of all variables, by their places in the program.
+        truth: The truth of each condition that depends on them, at each sample.
     """
 
     values: Mapping[Identity, Value]
@@ -120,37 +125,37 @@ class Example:
 
 @dataclass(slots=True)
 class Examples:
-    """What the values of random variables can make of conditions, for one start.
+    """Finds the truths that values of random variables can give to conditions, for one start.
 
     Attributes:
-        initial: What the label of the start is matched with.
-        start: The start.
-        columns: Over the samples.
-        conditions: Those that hang on random variables, expanded, by number.
+        initial: The initial scene.
+        start: The label of the start.
+        columns: The samples as columns.
+        conditions: The conditions that depend on random variables, expanded, by number.
         first: The sample of the start.
-        decide: The run, given conditions that hang on random variables.
-        found: Examples so far.
+        decide: Decides the run from the truths of these conditions.
+        found: The examples so far.
     """
 
     initial: InitialScene
-    start: Remembered
+    start: StartLabel
     columns: AtomColumns
     conditions: Mapping[int, Node]
     first: int
     decide: Callable[[Mapping[int, Truth]], Runs]
     found: list[Example] = field(default_factory=list[Example])
     _asked: int = 0
-    _alike: dict[int, NDArray[np.int64]] = field(init=False)
+    _same_reading: dict[int, NDArray[np.int64]] = field(init=False)
     _observed: dict[int, NDArray[np.bool_]] = field(init=False)
 
     def __post_init__(self) -> None:
-        """Find where a condition is the same question."""
+        """Find the samples at which a condition reads the same values, so that it has one truth."""
         readings = {number: self.columns.readings(each) for number, each in self.conditions.items()}
         self._observed = {number: each >= 0 for number, each in readings.items()}
-        self._alike = {number: _first_alike(each, self.first) for number, each in readings.items()}
+        self._same_reading = {number: _first_same_reading(each, self.first) for number, each in readings.items()}
 
     def outcomes(self) -> list[tuple[Runs, Example]] | None:
-        """All that becomes of the run, each with an example, of which some may be unknown; None without any."""
+        """Every outcome of the run, with an example; some may be unknown. None if there is no example."""
         certain = self._certain()
         if certain is None:
             return None
@@ -166,11 +171,11 @@ class Examples:
                 found.append((run, examples[0]))
                 continue
             for truth in (FALSE, TRUE):
-                that = self._that(*place, holds=bool(truth == TRUE))
-                if that is None:
+                statement = self._state(*place, holds=bool(truth == TRUE))
+                if statement is None:
                     found.append((run, examples[0]))
                     continue
-                further = (*assumed, that)
+                further = (*assumed, statement)
                 fit = [each for each in examples if each.truth[place[0]][place[1]] == truth]
                 answer = bool(fit) or self._ask(Logic(LogicOp.AND, further) if assumed else further[0])
                 if answer and not fit:
@@ -178,14 +183,14 @@ class Examples:
                 if fit:
                     number, sample = place
                     more = {**known, number: known[number].copy()}
-                    more[number][self._alike[number] == self._alike[number][sample]] = truth
+                    more[number][self._same_reading[number] == self._same_reading[number][sample]] = truth
                     cases.append((more, further, fit))
                 elif answer is not False:
                     found.append((run, examples[0]))
         return found
 
     def _open_place(self, known: Mapping[int, Truth], example: Example) -> _Place | None:
-        """Where the first condition is that values can make hold or not; None where only observations are missing."""
+        """The first place at which a condition is open; None where only observations are missing."""
         samples = range(self.first, len(self.columns.samples))
         return next(
             (
@@ -200,35 +205,39 @@ class Examples:
         )
 
     def _certain(self) -> Mapping[int, Truth] | None:
-        """For each condition its value at each sample where it has only one, else unknown; None without an example."""
+        """The certain truths of each condition, unknown where it is open; None if there is no example."""
         if self._ask(None) is not True:
             return None
         base = self.found[0].truth
-        hanging = [(number, sample) for number, sample in self._hanging() if self._alike[number][sample] == sample]
-        open_ = {(n, k) for n, k in hanging if any(each.truth[n][k] != base[n][k] for each in self.found)}
-        stack = [hanging] if hanging else []
+        asked_places = [
+            (number, sample)
+            for number, sample in self._undecided_by_bounds()
+            if self._same_reading[number][sample] == sample
+        ]
+        open_ = {(n, k) for n, k in asked_places if any(each.truth[n][k] != base[n][k] for each in self.found)}
+        stack = [asked_places] if asked_places else []
         while stack:
             look()
             asked = [each for each in stack.pop() if each not in open_]
-            # what is not all observed can come out otherwise for all that is known, and what cannot be said, too
-            otherwise = {
-                place: that
+            # conditions on what is not observed, and those that cannot be stated, may have either truth
+            negated = {
+                place: statement
                 for place in asked
                 if self._observed[place[0]][place[1]]
-                and (that := self._that(*place, holds=bool(base[place[0]][place[1]] != TRUE))) is not None
+                and (statement := self._state(*place, holds=bool(base[place[0]][place[1]] != TRUE))) is not None
             }
-            open_ |= set(asked) - otherwise.keys()
-            block, those = [*otherwise], tuple(otherwise.values())
+            open_ |= set(asked) - negated.keys()
+            block, questions = [*negated], tuple(negated.values())
             if not block:
                 continue
-            answer = self._ask(those[0] if len(block) == 1 else Logic(LogicOp.OR, those))
+            answer = self._ask(questions[0] if len(block) == 1 else Logic(LogicOp.OR, questions))
             if answer is False:
                 continue
             if answer is True:
                 other = self.found[-1].truth
-                turned = {(n, k) for n, k in block if other[n][k] != base[n][k]}
-                if turned:
-                    open_ |= turned
+                changed = {(n, k) for n, k in block if other[n][k] != base[n][k]}
+                if changed:
+                    open_ |= changed
                     stack.append(block)
                     continue
             if len(block) == 1:
@@ -237,24 +246,24 @@ class Examples:
                 stack += [block[: len(block) // 2], block[len(block) // 2 :]]
         certain = {number: truth.copy() for number, truth in base.items()}
         for number, sample in open_:
-            certain[number][self._alike[number] == sample] = UNKNOWN
+            certain[number][self._same_reading[number] == sample] = UNKNOWN
         return certain
 
-    def _hanging(self) -> list[_Place]:
-        """Conditions at the samples where bounds of what does not change over time leave both values possible."""
+    def _undecided_by_bounds(self) -> list[_Place]:
+        """Places that bounds of unchanging numbers and points do not decide."""
         nodes = unchanging(list(self.conditions.values()))
         bounds: dict[int, Sequence[Bounds]] = {}
-        left = self._left(bounds)
-        for narrowed in (self._enclosed, self._tighter):
+        left = self._open_beside(bounds)
+        for narrowed in (self._find_bounds, self._tighten):
             for node in nodes if left else ():
                 found = narrowed(_numbers_of(node), bounds.get(id(node)))
                 if found is not None:
                     bounds[id(node)] = found
-            left = self._left(bounds)
+            left = self._open_beside(bounds)
         return left
 
-    def _left(self, bounds: Mapping[int, Sequence[Bounds]]) -> list[_Place]:
-        """Where the first example says what a condition is, and bounds do not."""
+    def _open_beside(self, bounds: Mapping[int, Sequence[Bounds]]) -> list[_Place]:
+        """Places at which the first example decides a condition, and bounds do not."""
         found: list[_Place] = []
         for number, each in self.conditions.items():
             base = self.found[0].truth[number]
@@ -262,8 +271,8 @@ class Examples:
             found += [(number, place) for place in np.flatnonzero(open_).tolist() if place >= self.first]
         return found
 
-    def _enclosed(self, parts: Sequence[Node], _: object) -> Sequence[Bounds] | None:
-        """Bounds of numbers near the examples, beyond which none of them is; None if none are found."""
+    def _find_bounds(self, parts: Sequence[Node], _: object) -> Sequence[Bounds] | None:
+        """Find bounds of numbers, the closest to the examples that hold for all values; None if there are none."""
         for reach in _REACHES:
             bounds = [(low - reach, high + reach) for low, high in map(self._span, parts)]
             if not all(map(math.isfinite, itertools.chain(*bounds))):
@@ -274,11 +283,11 @@ class Examples:
                 return None if answer is None else bounds
         return None
 
-    def _tighter(self, parts: Sequence[Node], bounds: Sequence[Bounds] | None) -> Sequence[Bounds] | None:
-        """Bounds nearer to the examples, of which more are found."""
-        return bounds and [self._halved(*each) for each in zip(parts, bounds, strict=True)]
+    def _tighten(self, parts: Sequence[Node], bounds: Sequence[Bounds] | None) -> Sequence[Bounds] | None:
+        """Move bounds closer to the examples; more examples are found on the way."""
+        return bounds and [self._tighten_one(*each) for each in zip(parts, bounds, strict=True)]
 
-    def _halved(self, part: Node, bounds: Bounds) -> Bounds:
+    def _tighten_one(self, part: Node, bounds: Bounds) -> Bounds:
         ends = list(bounds)
         for side in (0, 1):
             close = abs(ends[side] - self._span(part)[side]) * _CLOSE
@@ -296,13 +305,13 @@ class Examples:
             return self._ask(wanted)
 
     def _span(self, part: Node) -> Bounds:
-        """The least and the greatest value that examples have of a number; nan where one has none."""
+        """The least and greatest value of a number among the examples; nan where one has no value."""
         found = [self.columns.assigned(each.values).number(part) for each in self.found]
         values = [math.nan if each is None else float(each[self.first]) for each in found]
         return float(np.min(values)), float(np.max(values))
 
     def _ask(self, wanted: Node | None) -> bool | None:
-        """Whether there are values for which a condition holds, which are kept; None if not known."""
+        """Look for an example with which a condition holds, and keep it; False if there is none, None if not known."""
         if self._asked >= LIMITS.start_questions:
             return None
         self._asked += 1
@@ -320,8 +329,8 @@ class Examples:
         self.found.append(Example(values, verdict.witness, truth))
         return True
 
-    def _that(self, number: int, sample: int, *, holds: bool) -> Node | None:
-        """That a condition holds at a sample, or that it does not; None if that cannot be said."""
+    def _state(self, number: int, sample: int, *, holds: bool) -> Node | None:
+        """State for the matcher that a condition holds at a sample, or fails there; None if it cannot be stated."""
 
         def observed(node: Node) -> Node:
             # what is read at the start is observed by the label
@@ -331,8 +340,8 @@ class Examples:
         return here if holds else untrue(here)
 
 
-def _first_alike(readings: NDArray[np.int64], first: int) -> NDArray[np.int64]:
-    """For each sample the first one, from the start on, at which a condition reads the same, all of it observed."""
+def _first_same_reading(readings: NDArray[np.int64], first: int) -> NDArray[np.int64]:
+    """For each sample the first one, from the start on, at which a condition reads the same observed values."""
     found = np.arange(len(readings))
     after = readings[first:]
     _, where, which = np.unique(after, return_index=True, return_inverse=True)
@@ -341,10 +350,10 @@ def _first_alike(readings: NDArray[np.int64], first: int) -> NDArray[np.int64]:
 
 
 def _assignment(variables: Sequence[Leaf], known: Mapping[Identity, Value]) -> Mapping[Identity, Value] | None:
-    """The value of each variable by identity, as several may share a place in the program; None where one has none."""
+    """The value of each variable, by identity, as several may share a place; None if one has no value."""
 
     def value(leaf: Leaf, parameters: tuple[Value, ...]) -> Value:
-        # of what the scene says nothing, any value does
+        # a variable that the initial scene does not restrict may have any value
         told = known.get(leaf.identity)
         return draw_leaf(leaf, parameters, random.Random(0)) if told is None else told
 
@@ -362,5 +371,5 @@ def _numbers_of(node: Node) -> list[Node]:
 
 
 def _beyond(number: Node, low: float, high: float) -> tuple[Node, Node]:
-    """That a number is below an end, and that it is above another."""
+    """The conditions that a number is below one end, and above the other."""
     return Compare(CompareOp.LT, number, Constant(low)), Compare(CompareOp.GT, number, Constant(high))

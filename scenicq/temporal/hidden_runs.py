@@ -1,4 +1,4 @@
-"""Runs whose conditions hang on random variables of the scene: the best that any values of these make of each start."""
+"""Runs whose conditions depend on random variables of the scene: for each start, the best that any values give."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from scenicq.limits import LIMITS
 from scenicq.match.options import MatchOptions
 from scenicq.match.verdict import Match, Unknown, WitnessValue
 from scenicq.temporal.atoms import AtomColumns, UnclearVariable
-from scenicq.temporal.hidden import inside
+from scenicq.temporal.hidden import value_between
 from scenicq.temporal.hidden_bounds import PossibleValues
 from scenicq.temporal.hidden_conditions import HiddenConditions
-from scenicq.temporal.hidden_examples import Example, Examples, InitialScene, Remembered
+from scenicq.temporal.hidden_examples import Example, Examples, InitialScene, StartLabel
 from scenicq.temporal.outcomes import place_of
 from scenicq.temporal.run_lanes import follow_runs
 from scenicq.temporal.run_machine import RunMachine
@@ -30,7 +30,7 @@ from scenicq.temporal.runs import Runs
 from scenicq.temporal.stretches import Stretches
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
-__all__ = ["HiddenRuns", "Remembered"]
+__all__ = ["HiddenRuns", "StartLabel"]
 
 Numbers = NDArray[np.float64]
 _THIN = 4e-12
@@ -63,7 +63,7 @@ class HiddenRuns:
 
     def follow(
         self, stretches: Stretches, columns: AtomColumns, expanded: Sequence[Node],
-        remember: Callable[[int], Remembered],
+        remember: Callable[[int], StartLabel],
     ) -> Runs:  # fmt: skip
         """What becomes of the runs from all starts: the best that any values make of each first, then others.
 
@@ -89,7 +89,7 @@ class HiddenRuns:
 
     def _of_stretch(
         self, stretch: Stretches, columns: AtomColumns, expanded: Sequence[Node],
-        remember: Callable[[int], Remembered],
+        remember: Callable[[int], StartLabel],
     ) -> Runs:  # fmt: skip
         """The runs of one stretch."""
         try:
@@ -108,7 +108,7 @@ class HiddenRuns:
 
     def _by_values(
         self, stretches: Stretches, columns: AtomColumns, expanded: Sequence[Node],
-        remember: Callable[[int], Remembered],
+        remember: Callable[[int], StartLabel],
     ) -> Runs:  # fmt: skip
         """The runs by the values of hidden numbers."""
         hidden = HiddenConditions(columns, expanded)
@@ -129,7 +129,7 @@ class HiddenRuns:
 
     def _within(
         self, stretches: Stretches, columns: AtomColumns, expanded: Sequence[Node],
-        remember: Callable[[int], Remembered], hidden: HiddenConditions, possible: tuple[Numbers, Numbers] | None,
+        remember: Callable[[int], StartLabel], hidden: HiddenConditions, possible: tuple[Numbers, Numbers] | None,
     ) -> Runs:  # fmt: skip
         """The runs by those values of hidden numbers with which they may match, or by all."""
         pieces = follow_runs(self.machine, stretches, columns.reader(expanded), hidden, possible)
@@ -139,7 +139,7 @@ class HiddenRuns:
         thin = _thin(pieces)
         doubted = thin & (pieces.truth == TRUE)
         if not joint:
-            # where other values prove the same, nothing hangs on these
+            # where other values prove the same, nothing depends on these
             end = pieces.owner * (int(pieces.ends.max(initial=0)) + 1) + pieces.ends
             doubted &= ~np.isin(end, end[~thin & (pieces.truth == TRUE)])
         self._confirm(pieces, np.flatnonzero(doubted), stretches, expanded, hidden)
@@ -178,7 +178,7 @@ class HiddenRuns:
                 pieces.truth[each] = FALSE
 
     def _by_examples(
-        self, one: Stretches, columns: AtomColumns, expanded: Sequence[Node], start: Remembered, unclear: str
+        self, one: Stretches, columns: AtomColumns, expanded: Sequence[Node], start: StartLabel, unclear: str
     ) -> Runs:
         """The matches of a start by what its label says of the variables, the longest first, else why there is none."""
         hanging = {number: each for number, each in enumerate(expanded) if any(True for _ in leaves(each))}
@@ -213,7 +213,7 @@ class HiddenRuns:
 
     def _again(
         self, pieces: Runs, order: NDArray[np.int64], firsts: NDArray[np.int64], hidden: HiddenConditions,
-        joint: Sequence[int], stretches: Stretches, remember: Callable[[int], Remembered],
+        joint: Sequence[int], stretches: Stretches, remember: Callable[[int], StartLabel],
     ) -> Runs:  # fmt: skip
         """Match starts again with the values of random variables that the initial scene has, too.
 
@@ -221,7 +221,7 @@ class HiddenRuns:
             pieces: The runs.
             order: Their order, those of each start from the best one on.
             firsts: Where in it each start's begin.
-            hidden: What hangs on hidden numbers.
+            hidden: What depends on hidden numbers.
             joint: Those numbers that the initial scene has, too.
             stretches: Stretches with their starts.
             remember: The label of a start by its number.
@@ -246,7 +246,7 @@ class HiddenRuns:
         return runs.some(np.argsort(runs.owner, kind="stable"))
 
     def _jointly(
-        self, start: Remembered, pieces: Runs, group: NDArray[np.int64], hidden: HiddenConditions, joint: Sequence[int]
+        self, start: StartLabel, pieces: Runs, group: NDArray[np.int64], hidden: HiddenConditions, joint: Sequence[int]
     ) -> Runs:
         """The best runs of a start, given its pieces in order."""
         undecided: Runs | None = None
@@ -287,7 +287,7 @@ def _one_each(matches: Sequence[Runs]) -> list[Runs]:
 def _values(hidden: HiddenConditions, pieces: Runs, number: int) -> dict[Identity, Value]:
     """A value of each hidden number in a piece."""
     ends = zip(pieces.low[number].tolist(), pieces.high[number].tolist(), strict=True)
-    return {leaf.identity: inside(*each) for leaf, each in zip(hidden.variables, ends, strict=True)}
+    return {leaf.identity: value_between(*each) for leaf, each in zip(hidden.variables, ends, strict=True)}
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -19,7 +19,7 @@ class IntervalOptions:
     """How intervals are looked for.
 
     Attributes:
-        intervals: Of overlapping ones the longest, or all.
+        intervals: Whether to report the longest of overlapping intervals, or all.
         min_duration_s: How long an interval must be at least; None for a static program that is matched frame by frame.
         gap_s: Seconds without a label after which a track's life ends.
     """

@@ -2,7 +2,7 @@
 
 A binding gives each object of the scenario a track, for the whole interval. A start is a sample whose label matches
 the initial scene under a binding. All runs of a block are followed side by side, on columns over the samples in which
-all tracks of a binding live (`stretches`); where conditions hang on random variables of the scene, by the values of
+all tracks of a binding live (`stretches`); where conditions depend on random variables of the scene, by the values of
 these for which they hold (`hidden_runs`).
 """
 
@@ -32,15 +32,15 @@ from scenicq.temporal.arrivals import Arrivals, LabelOf
 from scenicq.temporal.atoms import AtomColumns, reads_start
 from scenicq.temporal.hidden import random_variables
 from scenicq.temporal.hidden_examples import InitialScene
-from scenicq.temporal.hidden_runs import HiddenRuns, Remembered
+from scenicq.temporal.hidden_runs import HiddenRuns, StartLabel
 from scenicq.temporal.interval_options import IntervalOptions
 from scenicq.temporal.outcomes import Outcome, outcomes_of, steady_value
-from scenicq.temporal.presence import by_presence
+from scenicq.temporal.presence import group_by_observed
 from scenicq.temporal.run_lanes import follow_runs
 from scenicq.temporal.run_machine import RunMachine
 from scenicq.temporal.runs import Detail, Runs
 from scenicq.temporal.samples import is_moving
-from scenicq.temporal.selection import chosen
+from scenicq.temporal.selection import choose_intervals
 from scenicq.temporal.stretches import StartTable, Stretches, stretches_of
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
@@ -129,7 +129,7 @@ class IntervalMatcher:
         options: The options of intervals.
         solver: Decides what is not decided otherwise.
         reasons: Whether somebody reads what bindings fail at.
-        outcomes: The outcomes of the choices that conditions over time hang on.
+        outcomes: The outcomes of the choices that conditions over time depend on.
     """
 
     scenario: Scenario
@@ -159,14 +159,14 @@ class IntervalMatcher:
         return TrackReach(limit_s, self.options.gap_s) if limit_s is not None and moving else None
 
     def intervals(
-        self, table: StartTable, remember: Callable[[int], Remembered], *, every: bool = True,
+        self, table: StartTable, remember: Callable[[int], StartLabel], *, every: bool = True,
         label: LabelOf | None = None,
     ) -> Reported:  # fmt: skip
         """What became of each binding: the intervals to report, or else the one that came furthest.
 
         Args:
             table: The starts.
-            remember: The label of a start by its number, with who plays whom.
+            remember: Gives the label of a start by its number, with the correspondence.
             every: Whether bindings without an interval are told of, too.
             label: Makes labels of samples at which objects come.
         """
@@ -183,11 +183,11 @@ class IntervalMatcher:
         parts: list[Runs] = []
         for outcome in cast("list[int]", np.unique(table.outcomes).tolist()):
             which = np.flatnonzero(table.outcomes == outcome)
-            # a machine has met nothing before, so that what becomes of a block hangs on no other one
+            # a machine has met nothing before, so that what becomes of a block depends on no other one
             own = table.chosen(which)
             program = _Program(InitialScene(self.outcomes[outcome].scenario, self.match, self.solver))
 
-            def remembered(number: int, which: NDArray[np.int64] = which) -> Remembered:
+            def remembered(number: int, which: NDArray[np.int64] = which) -> StartLabel:
                 return remember(int(order[which[number]]))
 
             for stretches in stretches_of(own, self.options.gap_s, apart=program.apart, classes=self.match.classes):
@@ -210,15 +210,15 @@ class IntervalMatcher:
         return Reported(found, len(table))
 
     def _followed(
-        self, program: _Program, stretches: Stretches, table: StartTable, remember: Callable[[int], Remembered]
+        self, program: _Program, stretches: Stretches, table: StartTable, remember: Callable[[int], StartLabel]
     ) -> Iterator[tuple[Stretches, Runs]]:
         """The runs of some stretches, those together in which the same features are observed."""
         dynamics = program.scenario.dynamics
         if dynamics is None:
             yield stretches, _static(stretches, table)
             return
-        for chosen_ in by_presence(stretches.places, *dynamics.conditions, stretches=stretches.bounds[:-1]):
-            some = stretches if len(chosen_) == len(stretches.labels) else stretches.some(chosen_)
+        for places in group_by_observed(stretches.places, *dynamics.conditions, stretches=stretches.bounds[:-1]):
+            some = stretches if len(places) == len(stretches.labels) else stretches.some(places)
             columns = AtomColumns(program.scenario, some.places, start=some.heads())
             expanded = [columns.expanded(condition) for condition in dynamics.conditions]
             look()
@@ -229,7 +229,7 @@ class IntervalMatcher:
 
     def _dynamic(
         self, program: _Program, stretches: Stretches, columns: AtomColumns, expanded: Sequence[Node],
-        remember: Callable[[int], Remembered],
+        remember: Callable[[int], StartLabel],
     ) -> Runs:  # fmt: skip
         assert program.machine is not None
         if random_variables(expanded):
@@ -269,7 +269,7 @@ class IntervalMatcher:
             surest = _surest(first, last, truth[several])
             several, first, last = several[surest], first[surest], last[surest]
         look()
-        kept = several[chosen(first, last, truth[several], lasting[several], self.options.intervals, least)]
+        kept = several[choose_intervals(first, last, truth[several], lasting[several], self.options.intervals, least)]
         told = self._verdicts(found.some(np.concatenate((alone, kept))), table, order)
         # what was cut off might have matched; else what was matched but is too short, else what came furthest
         open_ = np.flatnonzero(many[own] == 0)

@@ -33,10 +33,10 @@ from scenicq.forest.walk import features, postorder
 from scenicq.store.track_block import TrackBlock, in_order
 from scenicq.temporal.atoms import AtomColumns, reads_start
 from scenicq.temporal.first_exits import next_at
-from scenicq.temporal.hidden import possibly
+from scenicq.temporal.hidden import necessary_condition
 from scenicq.temporal.required import Required
 from scenicq.temporal.samples import MOVING, BoundSamples
-from scenicq.temporal.starts import RoleCandidates, narrowed
+from scenicq.temporal.starts import RoleCandidates, narrow_candidates
 from scenicq.temporal.truth import FALSE, Truth
 
 __all__ = ["NecessaryConditions"]
@@ -74,7 +74,7 @@ class NecessaryConditions:
         some: list[tuple[Atom, ...]] = [(atom,) for atom in required.later]
         if required.ends and self.within_s is None:
             some.append(required.ends)
-        conditions = [possibly(each) for each in dynamics.conditions]
+        conditions = [necessary_condition(each) for each in dynamics.conditions]
         for atom in (*required.at_start, *required.always):
             condition = conditions[atom.number]
             if condition is not None and (role := self._role([condition])) is not None:
@@ -117,7 +117,7 @@ class NecessaryConditions:
         place = np.searchsorted(candidates.labels, block.label_of[candidates.members])
         there = [np.bincount(place[mine], minlength=len(candidates.labels)) > 0 for mine in may.values()]
         found = RoleCandidates(candidates.labels, candidates.members, may)
-        return narrowed(found, np.logical_and.reduce(there), place) if there else found
+        return narrow_candidates(found, np.logical_and.reduce(there), place) if there else found
 
     def _truth(self, block: TrackBlock, role: int, members: Members, condition: Node) -> Truth:
         """The value of a condition where an object plays a role."""

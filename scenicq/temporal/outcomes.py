@@ -1,4 +1,4 @@
-"""The discrete choices that conditions over time hang on: each joint outcome makes a scenario without them.
+"""The discrete choices that conditions over time depend on: each joint outcome makes a scenario without them.
 
 The outcome of a choice is part of a run from its first sample on: one for the initial scene, all requirements, all that
 ends a run and all monitors. So outcomes are split off before anything else is decided, and a recording matches if it
@@ -37,7 +37,7 @@ class Outcome:
     Attributes:
         scenario: The scenario with the choices made.
         witness: What was chosen, by the places in the program.
-        same_start: Whether the initial scene hangs on none of the choices.
+        same_start: Whether the initial scene depends on none of the choices.
     """
 
     scenario: Scenario
@@ -46,7 +46,7 @@ class Outcome:
 
 
 def outcomes_of(scenario: Scenario) -> tuple[Outcome, ...]:
-    """The joint outcomes of the choices that conditions over time hang on; one without choices if there are none.
+    """The joint outcomes of the choices that conditions over time depend on; one without choices if there are none.
 
     Args:
         scenario: The scenario as compiled.
@@ -79,7 +79,7 @@ def steady_value(scenario: Scenario, feature: Feature) -> Node | None:
 
 
 def _choice(scenario: Scenario) -> tuple[Leaf, range] | None:
-    """A choice that conditions over time hang on, with its options."""
+    """A choice that conditions over time depend on, with its options."""
     dynamics = scenario.dynamics
     conditions = () if dynamics is None else dynamics.conditions
     roots = [expand(each, lambda feature: steady_value(scenario, feature)) for each in conditions]
@@ -107,10 +107,10 @@ def _is_hidden_lookup(node: Node) -> bool:
 
 
 def _from_the_start(scenario: Scenario) -> Scenario:
-    """The scenario with requirements on its first sample among those over time, where both hang on a hidden number.
+    """The scenario with requirements on its first sample among those over time, where both depend on a hidden number.
 
     What both say of the number is then decided together, exactly. The initial scene may leave these requirements out
-    where nothing else in it hangs on the numbers. Where both say the same condition or its negation, they come out
+    where nothing else in it depends on the numbers. Where both say the same condition or its negation, they come out
     together, too, even where nothing observes what the condition reads.
     """
     dynamics = scenario.dynamics

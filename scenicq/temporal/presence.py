@@ -1,4 +1,8 @@
-"""Places grouped by what is observed there: what is not has the program's own value."""
+"""Group samples by which properties their labels observe.
+
+Where a label lacks a property, the program's own value counts. So samples with the same observed properties share one
+expression, and are evaluated together.
+"""
 
 from __future__ import annotations
 
@@ -12,50 +16,53 @@ from scenicq.forest.nodes import COURSE, GOING, LAST_LANE, Node
 from scenicq.forest.walk import features
 from scenicq.temporal.samples import BoundSamples, is_moving
 
-__all__ = ["by_presence", "observes"]
+__all__ = ["group_by_observed", "observed_properties"]
 
-Chosen = NDArray[np.int64]
+_Places = NDArray[np.int64]
 
 
-def by_presence(
+def group_by_observed(
     places: BoundSamples, *conditions: Node, stretches: NDArray[np.int64] | None = None
-) -> Iterator[Chosen]:
-    """Numbers of places, those together at which the same features of conditions are observed.
+) -> Iterator[_Places]:
+    """Group samples by which features of some conditions are observed; yields the places of each group.
 
-    Features that change from sample to sample do not count.
+    Features that change from sample to sample do not count: where these are not observed, the condition is unknown.
 
     Args:
-        places: The places.
+        places: The samples.
         conditions: The conditions.
-        stretches: Numbers of places with which stretches begin: a feature that is observed somewhere in one counts as
-            observed all over it. Without them each place is one of its own.
+        stretches: Places at which stretches begin. A feature that is observed somewhere in a stretch counts as observed
+            in all of it. If None, each sample is a stretch of its own.
     """
     wanted = sorted({each for each in features(*conditions) if not is_moving(each[1]) and each[0] != PARAMS})
-    seen = [_present(places, index, name) for index, name in wanted]
+    seen = [_is_observed(places, index, name) for index, name in wanted]
     if stretches is not None and len(stretches):
         lengths = np.diff(np.append(stretches, len(places)))
         seen = [np.repeat(np.logical_or.reduceat(each, stretches), lengths) for each in seen]
-    yield from (chosen for _, chosen in _together(seen, len(places)))
+    yield from (chosen for _, chosen in _group(seen, len(places)))
 
 
-def observes(
+def observed_properties(
     places: BoundSamples, relevant: Sequence[frozenset[str]]
-) -> Iterator[tuple[tuple[frozenset[str], ...], Chosen]]:
-    """What is observed of each object of a scenario, with the places at which it is just that.
+) -> Iterator[tuple[tuple[frozenset[str], ...], _Places]]:
+    """Group samples by which relevant properties of each object are observed.
 
     Args:
-        places: The places.
-        relevant: The properties in question of each object.
+        places: The samples.
+        relevant: The properties that matter, for each object of the scenario.
+
+    Yields:
+        The observed properties of each object, and the places of the samples that observe just these.
     """
     wanted = [(index, name) for index, names in enumerate(relevant) for name in sorted(names)]
-    seen = [_present(places, index, name) for index, name in wanted]
-    for there, chosen in _together(seen, len(places)):
+    seen = [_is_observed(places, index, name) for index, name in wanted]
+    for there, chosen in _group(seen, len(places)):
         found = [each for each, one in zip(wanted, there, strict=True) if one]
         yield tuple(frozenset(name for mine, name in found if mine == index) for index in range(len(relevant))), chosen
 
 
-def _present(places: BoundSamples, index: int, name: str) -> NDArray[np.bool_]:
-    if name in (COURSE, GOING, LAST_LANE):  # whoever is observed has one, if only that it has no heading
+def _is_observed(places: BoundSamples, index: int, name: str) -> NDArray[np.bool_]:
+    if name in (COURSE, GOING, LAST_LANE):  # every observed object has these, even if only to say that it has none
         return places.members[index] >= 0
     found = places.observed(index, name)
     if found is None:
@@ -65,15 +72,18 @@ def _present(places: BoundSamples, index: int, name: str) -> NDArray[np.bool_]:
     return np.array([value is not None for value in found], dtype=np.bool_)
 
 
-def _together(seen: Sequence[NDArray[np.bool_]], size: int) -> Iterator[tuple[tuple[bool, ...], Chosen]]:
-    """The places with equal truth values."""
+def _group(seen: Sequence[NDArray[np.bool_]], size: int) -> Iterator[tuple[tuple[bool, ...], _Places]]:
+    """Group places by some truth values; yields the values and the places that have them."""
     mixed = [number for number, each in enumerate(seen) if size and not (each.all() or not each.any())]
-    sure = tuple(bool(size and each[0]) for each in seen)
+    constant = tuple(bool(size and each[0]) for each in seen)
     if not mixed:
-        yield sure, np.arange(size)
+        yield constant, np.arange(size)
         return
     table = np.column_stack([seen[number] for number in mixed])
     rows, which = np.unique(table, axis=0, return_inverse=True)
     for number, row in enumerate(rows.tolist()):
         known = dict(zip(mixed, row, strict=True))
-        yield tuple(known.get(place, one) for place, one in enumerate(sure)), np.flatnonzero(which.ravel() == number)
+        yield (
+            tuple(known.get(place, one) for place, one in enumerate(constant)),
+            np.flatnonzero(which.ravel() == number),
+        )

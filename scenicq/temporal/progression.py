@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 from typing import assert_never
 
 from scenicq.forest.temporal import Always, And, Atom, Eventually, Formula, Next, Not, Or, Until
-from scenicq.limits import LIMITS, exhausted
-from scenicq.temporal.folding import folded
+from scenicq.limits import LIMITS, limit_exceeded
+from scenicq.temporal.folding import fold_value
 
 __all__ = ["HOLDS", "LOST", "Progression", "Rest", "accepts"]
 
@@ -51,7 +51,7 @@ class Progression:
 
     def add(self, formula: Formula) -> Rest:
         """What must hold from the first sample on, for a formula to hold."""
-        number = folded((formula, True), _operands, self._part)
+        number = fold_value((formula, True), _operands, self._part)
         return frozenset((frozenset(((number, True),)),))
 
     def _part(self, asked: tuple[Formula, bool], parts: list[int]) -> int:
@@ -94,7 +94,7 @@ class Progression:
         return _any_of(_all_of(values[number] for number, _ in clause) for clause in rest)
 
     def _here(self, numbers: set[int]) -> list[int]:
-        """The parts that hang on this sample, each behind those that it is made of."""
+        """The parts that depend on this sample, each behind those that it is made of."""
         found = set(numbers)
         stack = list(numbers)
         while stack:
@@ -161,7 +161,7 @@ def _all_of(rests: Iterable[Rest]) -> Rest:
 def _without_implied(clauses: set[frozenset[Obligation]]) -> Rest:
     """The clauses that imply no other one."""
     if len(clauses) > LIMITS.formula_clauses:
-        raise exhausted("formula_clauses")
+        raise limit_exceeded("formula_clauses")
     if len(clauses) < 2:
         return frozenset(clauses)
     return frozenset(one for one in clauses if not any(other < one for other in clauses))

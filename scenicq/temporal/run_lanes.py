@@ -1,9 +1,9 @@
 """All runs of many stretches side by side: each stays in its situation until a sample that leads elsewhere.
 
-Runs that stand in one situation before one sample go on alike, so what becomes of them is found once. Where conditions
-hang on hidden numbers, a run is split into pieces by the values of these for which it goes on alike: at a sample whose
-cut lies within a piece, it falls in two. Pieces of one start that touch and stand alike again are joined. Where a
-behavior chooses, it falls in one for each choice.
+Runs that are in one situation before one sample go on alike, so what becomes of them is found once. Where conditions
+depend on hidden numbers, a run is split into pieces by the values of these with which it goes on alike: a piece is cut
+in two at a sample whose threshold lies within it. Pieces of one start that touch and are in one situation again are
+joined. Where a behavior chooses, a run is split into one for each choice.
 """
 
 from __future__ import annotations
@@ -43,8 +43,8 @@ def follow_runs(
     Args:
         machine: The program.
         timeline: Samples with starts.
-        atom: The value of an atom that hangs on no hidden number at each place.
-        hidden: The conditions that hang on some.
+        atom: The value of an atom that depends on no hidden number at each place.
+        hidden: The conditions that depend on some.
         possible: Between which values of each variable each run may match, shape (starts, variables); other values are
             not followed, nor runs that are lost. None where somebody reads what they fail at.
     """

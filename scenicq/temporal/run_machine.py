@@ -39,7 +39,7 @@ from scenicq.forest.temporal import (
     operands,
     successors,
 )  # fmt: skip
-from scenicq.limits import LIMITS, exhausted
+from scenicq.limits import LIMITS, limit_exceeded
 from scenicq.temporal.literals import Literal, literals_of
 from scenicq.temporal.progression import HOLDS, LOST, Progression, Rest, accepts
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN
@@ -327,7 +327,7 @@ class RunMachine:
                 assumed = stack.pop()
                 tried += 1
                 if tried > LIMITS.observation_ways:
-                    raise exhausted("observation_ways")
+                    raise limit_exceeded("observation_ways")
                 try:
                     holds = self._holding(values, assumed)
                     found.add(self._step(mode, holds, chosen, due=due, here=here, later=later))
@@ -495,7 +495,7 @@ class RunMachine:
                     now.places[number] = _OVER
                     return False
                 case GiveUp():
-                    raise exhausted("scenario_starts")
+                    raise limit_exceeded("scenario_starts")
                 case _:
                     assert_never(step)
         if at >= 0:

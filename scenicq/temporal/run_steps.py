@@ -1,7 +1,7 @@
 """One step of many runs side by side: each stays in its situation until a sample that may lead elsewhere, and goes on.
 
-A run is a lane. Where conditions hang on hidden numbers, it is a lane for each piece of their values with which it goes
-on alike; at a sample whose cut lies within a piece, this falls in two.
+A run is a lane. Where conditions depend on hidden numbers, a run has a lane for each piece of their values with which
+it goes on alike; a piece is cut in two at a sample whose threshold lies within it.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from scenicq.errors import Span
 from scenicq.forest.temporal import Atom
 from scenicq.limits import LIMITS
 from scenicq.temporal.first_exits import FirstExits, next_at
-from scenicq.temporal.grouping import alike, groups
+from scenicq.temporal.grouping import group_equal, groups
 from scenicq.temporal.hidden_conditions import HiddenConditions
 from scenicq.temporal.run_machine import Advance, RunMachine
 from scenicq.temporal.run_notes import Notes
@@ -90,9 +90,9 @@ class RunSteps:
     Attributes:
         machine: The program.
         stretches: The stretches.
-        atom: The value of an atom that hangs on no hidden number at each place.
+        atom: The value of an atom that depends on no hidden number at each place.
         which: The numbers of the starts of the runs.
-        hidden: The conditions that hang on hidden numbers, if there are any.
+        hidden: The conditions that depend on hidden numbers, if there are any.
     """
 
     machine: RunMachine
@@ -105,7 +105,7 @@ class RunSteps:
     _cause_numbers: dict[Span, int] = field(default_factory=dict["Span", int])
 
     def __post_init__(self) -> None:
-        """Begin, and find the places at which the same is true of what hangs on no hidden number."""
+        """Begin, and find the places at which the same is true of what depends on no hidden number."""
         stretches, which = self.stretches, self.which
         self.starts, self.last = stretches.starts[which], stretches.ends()[which]
         limit_s = self.machine.dynamics.time_limit_s
@@ -117,7 +117,7 @@ class RunSteps:
         code = np.zeros(len(stretches), np.int64)
         for truth in truths:
             code = _told_apart(code, truth)
-        firsts, self.code = alike(code)
+        firsts, self.code = group_equal(code)
         told: list[list[int]] = [truth[firsts].tolist() for truth in truths]
         self.rows: list[dict[int, int]] = [
             {number: values[row] for number, values in zip(known, told, strict=True)} for row in range(len(firsts))
@@ -185,7 +185,7 @@ class RunSteps:
         code = self.code
         for each in told.values():
             code = _told_apart(code, each)
-        rows, which = alike(code)
+        rows, which = group_equal(code)
         stays = (Advance(number),)
         held = [
             self.machine.advance(number, self._row(place, told, place), due=False) == stays

@@ -36,7 +36,7 @@ FIXED = frozenset({"width", "length", "height"})
 """Properties that are the same at each sample."""
 
 _AT_ONCE = 200_000
-"""Label objects in memory of whom something is asked."""
+"""Label objects in memory about which something is asked."""
 _COLUMNS = {
     "heading": "heading", "width": "width", "length": "length", "height": "height",
     "angularSpeed": "yaw_rate", "acceleration": "acceleration",
@@ -52,7 +52,7 @@ Numbers = NDArray[np.float64]
 
 
 class Observed(Protocol):
-    """Some samples with who plays whom in each."""
+    """Some samples, with the label object of each role."""
 
     def __len__(self) -> int:
         """The number of samples."""
@@ -76,7 +76,7 @@ class BoundSamples:
 
     Attributes:
         block: The recordings.
-        members: By object of the scenario, who plays it at each place; -1 where it is not observed.
+        members: For each role, its member at each place; -1 where it is not observed.
         size: How many places there are.
         labels: The label of each place; None where somebody is observed at each.
         classes: How classes are compared.
@@ -201,7 +201,7 @@ class Samples:
 
     Attributes:
         tracks: The recording.
-        binding: Who plays whom.
+        binding: The track of each role.
         first, end: Samples of the stretch, the end left out.
     """
 
@@ -237,7 +237,7 @@ def _observed(
     """The values of a property; arguments as `Observed.observed`.
 
     Args:
-        name: Of the property.
+        name: Name of the property.
         column: A column of the store by its name.
         said: The values that labels give beside the columns, None where there is none.
     """

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 from scenicq.temporal.interval_options import Intervals
 from scenicq.temporal.truth import FALSE, TRUE, Truth
 
-__all__ = ["chosen"]
+__all__ = ["choose_intervals"]
 
 
-def chosen(
+def choose_intervals(
     starts: NDArray[np.int64],
     ends: NDArray[np.int64],
     truth: Truth,

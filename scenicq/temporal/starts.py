@@ -22,11 +22,11 @@ from scenicq.forest.scenario import Requirement
 from scenicq.forest.walk import features, leaves
 from scenicq.limits import LIMITS
 from scenicq.match.decide.closed_form import ClosedForm
-from scenicq.match.decide.range_forms import Columns, FloatColumn, Get
+from scenicq.match.decide.range_forms import Columns, FloatColumn, Lookup
 from scenicq.match.matcher import Matcher
 from scenicq.match.problem.constraints import Signature, describe_constraint, relevant_properties
 from scenicq.match.problem.map_lookups import MapLookups
-from scenicq.match.problem.preprocess import ready
+from scenicq.match.problem.preprocess import prepare_scenario
 from scenicq.match.problem.symmetry import classes_of_twins
 from scenicq.match.search.group_plan import MatchPlan
 from scenicq.match.search.plan_cache import PlanCache
@@ -34,11 +34,11 @@ from scenicq.number_ranges import expand_ranges
 from scenicq.store.track_block import TrackBlock
 from scenicq.temporal.atoms import AtomColumns
 from scenicq.temporal.outcomes import Outcome
-from scenicq.temporal.presence import by_presence, observes
+from scenicq.temporal.presence import group_by_observed, observed_properties
 from scenicq.temporal.samples import WITH_COLUMNS, BoundSamples
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
-__all__ = ["RoleCandidates", "StartSearch", "Starts", "narrowed", "start_matchers"]
+__all__ = ["RoleCandidates", "StartSearch", "Starts", "narrow_candidates", "start_matchers"]
 
 Members = NDArray[np.int64]
 _AT_ONCE = 200_000
@@ -47,7 +47,7 @@ _SCALARS = frozenset({"heading", "width", "length", "height"})
 
 @dataclass(frozen=True, slots=True)
 class RoleCandidates:
-    """Who may play whom in the labels of a block.
+    """The candidates of each role in the labels of a block.
 
     Attributes:
         labels: The labels in question, in order.
@@ -65,9 +65,9 @@ class Starts:
     """What the arrays tell of labels.
 
     Attributes:
-        members: Starts: by object of the scenario who plays it.
+        members: For each role, its member at each start.
         left: The labels that the matcher must decide.
-        sure: Of these labels, whether the plain requirements on what is observed are known to hold.
+        sure: Whether the plain requirements on what is observed are known to hold, for each of these labels.
         failed: What the labels that are excluded failed at.
     """
 
@@ -114,7 +114,7 @@ def start_matchers(matcher: Matcher, outcomes: Sequence[Outcome]) -> list[Matche
     def with_outcome(outcome: Outcome) -> Matcher:
         if outcome.same_start:
             return whole
-        scenario = ready(outcome.scenario)
+        scenario = prepare_scenario(outcome.scenario)
         derived = _Derived(scenario, matcher.options, whole=plans)
         return Matcher(scenario, matcher.options, matcher.solver, derived)
 
@@ -206,7 +206,7 @@ class StartSearch:
         starts, decided = self._correspondences(block, candidates, np.flatnonzero(sure & ~out))
         left = ~out
         left[decided] = False
-        return Starts(starts, narrowed(candidates, left, place), sure[left], failed)
+        return Starts(starts, narrow_candidates(candidates, left, place), sure[left], failed)
 
     def plain_truth(self, places: BoundSamples, requirements: Sequence[Requirement]) -> tuple[Truth, NDArray[np.int64]]:
         """Whether all requirements hold at each place, and the number of the first that does not, -1 if none."""
@@ -217,7 +217,7 @@ class StartSearch:
             left = np.flatnonzero(holds > FALSE)
             asked = places if len(left) == len(places) else places.at(left)
             truth = np.full(len(left), UNKNOWN)
-            for chosen in by_presence(asked, requirement.condition):
+            for chosen in group_by_observed(asked, requirement.condition):
                 columns = AtomColumns(self.matcher.scenario, asked.at(chosen))
                 expanded = columns.expanded(requirement.condition)
                 # what is random where the label does not tell is the matcher's
@@ -298,7 +298,7 @@ class StartSearch:
         """
         holds, fails = np.zeros(size, np.bool_), np.zeros(size, np.bool_)
         places, ordered = BoundSamples(block, members, size), {index: mine.copy() for index, mine in members.items()}
-        for signature, chosen in observes(places, self._relevant):
+        for signature, chosen in observed_properties(places, self._relevant):
             plan = self.rest.plans.plan((*signature, frozenset()))
             forms = [group.closed_form for group in plan.groups if group.closed_form is not None]
             if len(forms) < len(plan.groups) or not _in_order(block, plan, ordered, chosen):
@@ -339,7 +339,7 @@ def _in_order(block: TrackBlock, plan: MatchPlan, members: dict[int, Members], c
     return True
 
 
-def narrowed(candidates: RoleCandidates, kept: NDArray[np.bool_], place: NDArray[np.int64]) -> RoleCandidates:
+def narrow_candidates(candidates: RoleCandidates, kept: NDArray[np.bool_], place: NDArray[np.int64]) -> RoleCandidates:
     """The candidates of some of its labels; `place` is the label of each of its members."""
     mine = kept[place]
     return RoleCandidates(
@@ -357,7 +357,7 @@ def _column(places: BoundSamples, index: int, name: str) -> FloatColumn | tuple[
     return (found[0], found[1]) if len(found) == 2 else found[0]
 
 
-def _getter(places: BoundSamples, number: int) -> Get:
+def _getter(places: BoundSamples, number: int) -> Lookup:
     """The observed values of one choice of label objects."""
 
     def get(index: int, name: str) -> Value:

@@ -29,7 +29,7 @@ class StartTable:
 
     Attributes:
         block: The recordings.
-        members: By object of the scenario, who plays it, shape (m,).
+        members: For each role, its member at each start, shape (m,).
         sure: Whether it is a match, shape (m,).
         outcomes: With which outcome of the choices over time, by number, shape (m,).
     """
@@ -102,7 +102,7 @@ class Stretches(Timeline):
     """Stretches of recordings.
 
     Attributes:
-        places: Who plays whom at each place.
+        places: The samples, with the member of each role at each place.
         labels: The label of each place, shape (n,).
         numbers: The number of each start in its table.
     """

@@ -31,11 +31,11 @@ from scenicq.query.execution import executors
 from scenicq.query.execution.executors import (
     Executor,
     Question,
-    here,
-    in_order,
-    on_this_machine,
+    local_executor,
+    ordered_results,
     processes,
-    resumed,
+    resumable,
+    run_here,
     usual_pieces,
 )
 from scenicq.query.execution.pieces import partitions
@@ -134,12 +134,12 @@ def on_dask(_: Path) -> Executor:
 
 
 EXECUTORS: dict[str, Callable[[Path], Executor]] = {
-    "here": lambda _: here,
+    "here": lambda _: run_here,
     "processes": lambda _: processes(2),
     "dask": on_dask,
-    "resumed": lambda folder: resumed(folder / "pieces", here),
-    "resumed processes": lambda folder: resumed(folder / "pieces", processes(2)),
-    "resumed dask": lambda folder: resumed(folder / "pieces", on_dask(folder)),
+    "resumed": lambda folder: resumable(folder / "pieces", run_here),
+    "resumed processes": lambda folder: resumable(folder / "pieces", processes(2)),
+    "resumed dask": lambda folder: resumable(folder / "pieces", on_dask(folder)),
 }
 """What makes each executor, given a folder of its own."""
 ELSEWHERE = ("processes", "dask")
@@ -164,7 +164,7 @@ def test_the_pieces_are_the_whole(name: str, dataset: Dataset, undisturbed: Foun
     executor, decided = EXECUTORS[name](tmp_path), []
     for _ in range(2 if "resumed" in name else 1):
         found, decided = query(dataset, jobs=2), []
-        assert taken(found, in_order(found, executor, partitions(dataset, 6), decided.append)) == undisturbed
+        assert taken(found, ordered_results(found, executor, partitions(dataset, 6), decided.append)) == undisturbed
         assert sum(decided) == dataset.manifest.total.frames
     assert dask_children() == []
 
@@ -177,7 +177,7 @@ def test_pieces_of_several_maps_come_as_the_query_finds_them(name: str, two_maps
         found = replace(two_maps, funnel=Funnel())
         pieces = partitions(found.dataset, count)
         executor = EXECUTORS[name](tmp_path / str(count))
-        assert taken(found, in_order(found, executor, pieces, nothing)) == expected
+        assert taken(found, ordered_results(found, executor, pieces, nothing)) == expected
 
 
 @pytest.fixture(scope="module")
@@ -198,7 +198,7 @@ def test_a_limit_ends_where_it_ends_without_pieces(name: str, limit: int, datase
     found, executor = query(dataset, limit=limit), EXECUTORS[name](tmp_path)
     for _ in range(2 if "resumed" in name else 1):
         found = query(dataset, limit=limit)
-        assert taken(found, in_order(found, executor, partitions(dataset, 6), nothing))[0] == expected
+        assert taken(found, ordered_results(found, executor, partitions(dataset, 6), nothing))[0] == expected
         assert found.funnel.limited is not None
         assert record(found.funnel.limited) == record(whole.funnel.limited)
     assert dask_children() == []
@@ -209,14 +209,14 @@ def test_nothing_is_begun_when_the_time_is_over_and_nothing_is_left(
     name: str, dataset: Dataset, undisturbed: Found, tmp_path: Path
 ) -> None:
     late, executor = query(dataset, jobs=2, until=1.0), EXECUTORS[name](tmp_path)
-    assert taken(late, in_order(late, executor, usual_pieces(late, 6), nothing))[0] == []
+    assert taken(late, ordered_results(late, executor, usual_pieces(late, 6), nothing))[0] == []
     assert late.funnel.cut
     assert late.funnel.frames == 0
     assert not list(tmp_path.rglob("*"))
     assert dask_children() == []
     # a limit that is not reached changes nothing
     early = query(dataset, jobs=2, until=1e12)
-    assert taken(early, in_order(early, executor, usual_pieces(early, 6), nothing)) == undisturbed
+    assert taken(early, ordered_results(early, executor, usual_pieces(early, 6), nothing)) == undisturbed
 
 
 @every("resumed", "resumed processes", "resumed dask")
@@ -224,13 +224,13 @@ def test_whole_pieces_are_kept_and_a_later_run_does_the_others(
     name: str, dataset: Dataset, undisturbed: Found, tmp_path: Path
 ) -> None:
     first, executor = query(dataset), EXECUTORS[name](tmp_path)
-    with contextlib.closing(in_order(first, executor, partitions(dataset, 6), nothing)) as results:
+    with contextlib.closing(ordered_results(first, executor, partitions(dataset, 6), nothing)) as results:
         some = [record(next(results)) for _ in range(60)]  # and then it is stopped
     assert some == undisturbed[0][:60]
     done = {path: path.stat().st_mtime_ns for path in (tmp_path / "pieces").iterdir()}
     assert 0 < len(done) < 6
     second = query(dataset)
-    assert taken(second, in_order(second, executor, partitions(dataset, 6), nothing)) == undisturbed
+    assert taken(second, ordered_results(second, executor, partitions(dataset, 6), nothing)) == undisturbed
     assert {path: path.stat().st_mtime_ns for path in done} == done
 
 
@@ -251,7 +251,7 @@ def test_processes_that_are_killed(name: str, kills: int, dataset: Dataset, undi
                     os.kill(chance.choice(children).pid, signal.SIGKILL)
 
         executor = EXECUTORS[name](tmp_path / str(attempt))
-        assert taken(found, in_order(found, executor, partitions(dataset, 6), nothing), kill) == undisturbed
+        assert taken(found, ordered_results(found, executor, partitions(dataset, 6), nothing), kill) == undisturbed
         if killed == kills:
             break
     assert killed == kills
@@ -268,7 +268,7 @@ def test_a_frame_of_a_piece_that_kills_is_unknown_and_no_other(
     options = QueryOptions(MatchOptions(tolerance=EXACT, method="smt"), solver="sh -c 'kill -9 $PPID'", jobs=2)
     alone = [each.frame for each in Query(dataset, program, replace(options, solver="portable", jobs=1)).results()]
     killing = Query(dataset, program, options)
-    found = list(in_order(killing, EXECUTORS[name](tmp_path), partitions(dataset, 2), nothing))
+    found = list(ordered_results(killing, EXECUTORS[name](tmp_path), partitions(dataset, 2), nothing))
     assert [result.frame for result in found] == alone != []
     assert {result.verdict.reason for result in found if isinstance(result.verdict, Unknown)} == {"crash"}
 
@@ -276,17 +276,19 @@ def test_a_frame_of_a_piece_that_kills_is_unknown_and_no_other(
 @every()
 def test_who_stops_taking_leaves_no_process_behind(name: str, dataset: Dataset, tmp_path: Path) -> None:
     found = query(dataset, jobs=2)
-    with contextlib.closing(in_order(found, EXECUTORS[name](tmp_path), partitions(dataset, 6), nothing)) as results:
+    with contextlib.closing(
+        ordered_results(found, EXECUTORS[name](tmp_path), partitions(dataset, 6), nothing)
+    ) as results:
         next(results)
     assert dask_children() == []
 
 
 def test_as_many_processes_as_are_asked_for_or_pay(dataset: Dataset, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(executors, "processes", lambda count: count)
-    assert [on_this_machine(query(dataset, jobs=jobs)) for jobs in (1, None, 2, 5)] == [here, here, 2, 5]
+    assert [local_executor(query(dataset, jobs=jobs)) for jobs in (1, None, 2, 5)] == [run_here, run_here, 2, 5]
     monkeypatch.setattr(executors, "PIECE_FRAMES", 20)
-    monkeypatch.setattr(executors, "as_many_as_pay", lambda: 4)
-    assert on_this_machine(query(dataset, jobs=None)) == 4
+    monkeypatch.setattr(executors, "default_processes", lambda: 4)
+    assert local_executor(query(dataset, jobs=None)) == 4
 
 
 def test_another_dataset_under_the_same_path_is_noticed(dataset: Dataset, tmp_path: Path) -> None:
@@ -314,7 +316,7 @@ def test_dask_gives_the_same_and_listens_on_the_loopback_only(dataset: Dataset, 
             opened = [each for process in processes for each in process.net_connections("inet")]
             addresses.update(each.laddr.ip for each in opened if each.status == psutil.CONN_LISTEN)
 
-    assert taken(found, in_order(found, dask.dask(), partitions(dataset, 6), nothing), look) == undisturbed
+    assert taken(found, ordered_results(found, dask.dask(), partitions(dataset, 6), nothing), look) == undisturbed
     assert addresses == {"127.0.0.1"}
     assert dask_children() == []
 

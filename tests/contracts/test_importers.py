@@ -16,7 +16,7 @@ from shapely import box, unary_union
 from scenicq.geometry import angles
 from scenicq.importers.argoverse2 import Argoverse2
 from scenicq.importers.argoverse2_forecasting import Argoverse2Forecasting
-from scenicq.importers.base import Importer, Options
+from scenicq.importers.base import Importer, ImportOptions
 from scenicq.importers.commonroad import CommonRoad
 from scenicq.importers.ingest import ingest
 from scenicq.importers.interaction import Interaction
@@ -212,7 +212,7 @@ def case(request: pytest.FixtureRequest) -> Case:
 
 def read(case: Case) -> list[Recording]:
     report = Report()
-    found = list(case.importer.read(case.path, Options(case.maps), report).recordings(report))
+    found = list(case.importer.read(case.path, ImportOptions(case.maps), report).recordings(report))
     return [Recording(each.name, each.map, tuple(labels_of(each))) for each in found]
 
 
@@ -301,7 +301,7 @@ def test_moving_vehicles_head_where_they_move(case: Case) -> None:
 
 @pytest.mark.one_in(6)
 def test_egos_lie_on_the_map(case: Case) -> None:
-    source = case.importer.read(case.path, Options(case.maps), Report())
+    source = case.importer.read(case.path, ImportOptions(case.maps), Report())
     area = {
         name: box(*unary_union([feature.shape for feature in features]).bounds).buffer(case.margin_m)
         for name, features in source.maps.items()
@@ -319,7 +319,7 @@ def test_store_round_trip(case: Case, tmp_path: Path) -> None:
     assert (summary.frames, summary.objects, summary.tracks) == (case.frames, case.objects, case.tracks)
     dataset = open_dataset(tmp_path / "d")
     assert list(dataset.labels()) == read_labels(case)
-    for name, features in case.importer.read(case.path, Options(case.maps), Report()).maps.items():
+    for name, features in case.importer.read(case.path, ImportOptions(case.maps), Report()).maps.items():
         assert dataset.features(name) == features
 
 

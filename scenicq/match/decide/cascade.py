@@ -18,11 +18,11 @@ from scenicq.forest.nodes import (
     Value,
 )
 from scenicq.forest.walk import deciding_first, leaves
-from scenicq.limits import LIMITS, exhausted
+from scenicq.limits import LIMITS, limit_exceeded
 from scenicq.match.linear.affine_forms import affine_scalar, affine_vector
 from scenicq.match.linear.affine_reach import Reach, reach_heading, reach_number, reach_position
 from scenicq.match.linear.linear_relaxation import solve_affine
-from scenicq.match.problem.conditioned import Item, conditioned, options_of
+from scenicq.match.problem.conditioned import Item, condition_items, options_of
 from scenicq.match.problem.evaluation import ground_cause, holds, replay
 from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
 from scenicq.match.tolerance import SLACK, Tolerance
@@ -32,6 +32,9 @@ __all__ = ["decide"]
 
 def decide(items: list[Item], tolerance: Tolerance) -> Outcome:
     """Decide a group without a solver; `Undecided` with reason "nonlinear" where one is needed."""
+    if not items:
+        # what evaluation has decided needs no time, of which none may be left
+        return Satisfied({})
     try:
         return _Cascade(tolerance).decide(items, {}, 0)
     except Exhausted as error:
@@ -64,7 +67,7 @@ class _Cascade:
         if not open_items:
             return Satisfied(given)
         if depth > LIMITS.cascade_nesting:
-            raise exhausted("cascade_nesting")
+            raise limit_exceeded("cascade_nesting")
         for leaf in deciding_first([node for _, node, _ in open_items]):
             options = options_of(leaf)
             if options is not None:
@@ -86,7 +89,7 @@ class _Cascade:
             if isinstance(outcome, Undecided) or (number == 0 and isinstance(blamed, Refuted)):
                 blamed = outcome
             if self.branches > LIMITS.cascade_outcomes:
-                raise exhausted("cascade_outcomes")
+                raise limit_exceeded("cascade_outcomes")
         return blamed
 
     def _try_each(
@@ -100,7 +103,7 @@ class _Cascade:
         def outcomes() -> Iterator[Outcome]:
             for option in options:
                 chosen: dict[Identity, Value] = {leaf.identity: float(option)}
-                yield self.decide(conditioned(items, chosen), given | chosen, depth)
+                yield self.decide(condition_items(items, chosen), given | chosen, depth)
 
         return self._branch(items[0][0], outcomes())
 
@@ -124,7 +127,7 @@ class _Cascade:
         constraint = items[0][0]
         self.programs += 1
         if self.programs > LIMITS.cascade_programs:
-            raise exhausted("cascade_programs")
+            raise limit_exceeded("cascade_programs")
         try:
             found = solve_affine(items, [], self.tolerance)
         except CannotEvaluate:

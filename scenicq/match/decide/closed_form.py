@@ -20,7 +20,7 @@ from scenicq.forest.groups import Comparison, Condition
 from scenicq.forest.nodes import Identity, Value
 from scenicq.geometry.regions import Region
 from scenicq.geometry.road_direction import RoadDirection
-from scenicq.match.decide.range_forms import Columns, FloatColumn, Get
+from scenicq.match.decide.range_forms import Columns, FloatColumn, Lookup
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.map_lookups import XY, MapLookups
 from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied
@@ -44,7 +44,7 @@ class Evaluated(NamedTuple):
 
 FAILS = Evaluated(False, True, {})
 _UNCLEAR = Evaluated(False, False, {})
-Evaluate: TypeAlias = Callable[[Get, MatchOptions, MapLookups], Evaluated]
+Evaluate: TypeAlias = Callable[[Lookup, MatchOptions, MapLookups], Evaluated]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,10 +67,10 @@ class ClosedForm:
     field: RoadDirection | None = None
     regions: tuple[Region, ...] = ()
     index: int = -1
-    detail: Callable[[Get, MapLookups], str] | None = None
+    detail: Callable[[Lookup, MapLookups], str] | None = None
     parts: tuple[ClosedForm, ...] = ()
 
-    def decide(self, get: Get, options: MatchOptions, lookups: MapLookups) -> Outcome | None:
+    def decide(self, get: Lookup, options: MatchOptions, lookups: MapLookups) -> Outcome | None:
         """Decide one assignment.
 
         Args:
@@ -94,15 +94,15 @@ class ClosedForm:
                 pass
         return None
 
-    def evaluate_one(self, get: Get, options: MatchOptions, lookups: MapLookups) -> Evaluated:
-        """The same without words; nothing is said where an expression has no value."""
+    def evaluate_one(self, get: Lookup, options: MatchOptions, lookups: MapLookups) -> Evaluated:
+        """As `decide`, without words; None where an expression has no value."""
         try:
             return self.evaluate(get, options, lookups)
         except CannotEvaluate:
             return _UNCLEAR
 
     def evaluate_many(
-        self, row: Callable[[int], Get], columns: Columns, options: MatchOptions, lookups: MapLookups
+        self, row: Callable[[int], Lookup], columns: Columns, options: MatchOptions, lookups: MapLookups
     ) -> Evaluated:
         """Evaluate many assignments, each as `evaluate_one` does.
 
@@ -118,7 +118,7 @@ class ClosedForm:
         except CannotEvaluate:
             return self._one_by_one([row(number) for number in range(columns.size)], options, lookups)
 
-    def _one_by_one(self, rows: Sequence[Get], options: MatchOptions, lookups: MapLookups) -> Evaluated:
+    def _one_by_one(self, rows: Sequence[Lookup], options: MatchOptions, lookups: MapLookups) -> Evaluated:
         """Where columns do not do; nothing is said of those whose witness has other variables than the first one's."""
         outcomes = [self.decide(get, options, lookups) for get in rows]
         witnesses = [outcome.values if isinstance(outcome, Satisfied) else None for outcome in outcomes]

@@ -1,8 +1,8 @@
-"""The closed form of a group, if it has one: of comparisons with independent random variables, and of conditions.
+"""Find the closed form of a group: of comparisons with independent random variables, and of conditions.
 
-Where elements of the map overlap, a random rank says which of them is meant at a place (`geometry/occupancy`), and ties
-together all that looks something up there. At a place with one element the rank does not matter, so that a group which
-only a rank ties together is decided constraint by constraint; at any other place nothing is said.
+Where elements of the map overlap, a random *rank* says which of them is meant at a place (`geometry/occupancy`). It
+joins all constraints that look something up there into one group. At a place with only one element the rank makes no
+difference, so such a group has the closed forms of its constraints; at other places, the closed form says nothing.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from scenicq.forest.walk import children, leaves, postorder
 from scenicq.match.decide.closed_form import ClosedForm, Evaluated
 from scenicq.match.decide.closed_numbers import heading, number, text
 from scenicq.match.decide.closed_positions import known_vector, offset, point_in
-from scenicq.match.decide.compiled_expressions import VECTORS, CompiledExpressions, element_field, truth
-from scenicq.match.decide.range_forms import Columns, FloatColumn, Get, Scalar
+from scenicq.match.decide.compiled_expressions import VECTORS, CompiledExpressions, compile_condition, element_field
+from scenicq.match.decide.range_forms import Columns, FloatColumn, Lookup, Scalar
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.map_lookups import MapLookups
 
@@ -33,14 +33,14 @@ __all__ = ["closed_form_of"]
 
 
 def closed_form_of(group: Group, ego: int) -> ClosedForm | None:
-    """The closed form of a group, None if it has none.
+    """Find the closed form of a group; None if it has none.
 
     Args:
         group: The group.
         ego: Index of the object around which the radius is.
     """
-    ranked = _ranked(group)
-    chosen = {index.identity: 0.0 for index, _ in ranked}
+    ranks = _find_ranks(group)
+    chosen = {index.identity: 0.0 for index, _ in ranks}
     forms: list[ClosedForm] = []
     used: set[Identity] = set()
     for item in group.constraints:
@@ -51,12 +51,12 @@ def closed_form_of(group: Group, ego: int) -> ClosedForm | None:
         forms.append(form)
     if not forms:
         return None
-    return _where_alone(forms, ranked) if ranked else forms[0] if len(forms) == 1 else None
+    return _without_overlaps(forms, ranks) if ranks else forms[0] if len(forms) == 1 else None
 
 
 def _form_of(item: Constraint, ego: int, chosen: Mapping[Identity, float]) -> ClosedForm | None:
     if isinstance(item, Condition):
-        return _condition(item, chosen)
+        return _condition_form(item, chosen)
     if item.object == PARAMS:
         return None
     node = item.expression
@@ -69,8 +69,8 @@ def _form_of(item: Constraint, ego: int, chosen: Mapping[Identity, float]) -> Cl
     return number(item, chosen) if kind_of(node) == "scalar" else text(item)
 
 
-def _condition(item: Condition, chosen: Mapping[Identity, float]) -> ClosedForm | None:
-    holds = truth(item.expression, chosen)
+def _condition_form(item: Condition, chosen: Mapping[Identity, float]) -> ClosedForm | None:
+    holds = compile_condition(item.expression, chosen)
     if holds is None:
         return None
     known = {
@@ -78,19 +78,19 @@ def _condition(item: Condition, chosen: Mapping[Identity, float]) -> ClosedForm 
     }
     steps = steps_of(item.expression, known=known)
 
-    def evaluate(get: Get, options: MatchOptions, lookups: MapLookups) -> Evaluated:
+    def evaluate(get: Lookup, options: MatchOptions, lookups: MapLookups) -> Evaluated:
         if isinstance(get, Columns):
-            return _of_columns(item.expression, steps, known, get, chosen)
+            return _evaluate_columns(item.expression, steps, known, get, chosen)
         found = holds(get)
         return Evaluated(found, not found, {})
 
     return ClosedForm(item, evaluate, detail=lambda get, lookups: "does not hold")
 
 
-def _of_columns(
+def _evaluate_columns(
     root: Node, steps: Steps, known: Mapping[int, Column], get: Columns, chosen: Mapping[Identity, float]
 ) -> Evaluated:  # fmt: skip
-    """A condition of many labels; nothing is said where it has no value, or rounding may decide."""
+    """Evaluate a condition for many labels; it neither holds nor fails where it is undefined or rounding may decide."""
 
     def observed(node: Feature) -> Column:
         return Column(cast("NDArray[np.float64]", get(node.object, node.property)), np.full(1, DEFINED))
@@ -101,8 +101,8 @@ def _of_columns(
     return Evaluated((held & told).tolist(), (~held & told).tolist(), {})
 
 
-def _ranked(group: Group) -> list[tuple[Index, Select]]:
-    """The choices of a group that only say which of the elements at a place is meant, with the look-ups they are in."""
+def _find_ranks(group: Group) -> list[tuple[Index, Select]]:
+    """The ranks of a group, with the look-ups that they are in; choices that decide anything else are none."""
     looked_up: list[tuple[Index, Select]] = []
     others: set[Identity] = set()
     for node in postorder([item.expression for item in group.constraints]):
@@ -118,25 +118,25 @@ def _is_element(node: Node) -> bool:
     return any(element_field(each) is not None for each in children(node))
 
 
-def _where_alone(forms: Sequence[ClosedForm], ranked: Sequence[tuple[Index, Select]]) -> ClosedForm | None:
-    """All of some closed forms, where one element alone lies at each place that is looked up."""
+def _without_overlaps(forms: Sequence[ClosedForm], ranks: Sequence[tuple[Index, Select]]) -> ClosedForm | None:
+    """The conjunction of closed forms, which says nothing unless a single element lies at each place looked up."""
     numbers: list[list[Scalar]] = []
-    for index, node in ranked:
+    for index, node in ranks:
         made = [CompiledExpressions({index.identity: float(rank)}).exact(node) for rank in range(len(index.weights))]
         known = [cast(Scalar, each) for each in made if each is not None]
         if len(known) < len(made):
             return None
         numbers.append(known)
 
-    def alone(get: Get) -> NDArray[np.bool_]:
+    def alone(get: Lookup) -> NDArray[np.bool_]:
         found = np.ones(1, np.bool_)
-        for ranks in numbers:
-            first, *others = [np.asarray(each(get)) for each in ranks]
+        for options in numbers:
+            first, *others = [np.asarray(each(get)) for each in options]
             for other in others:
                 found = found & (first == other)
         return found
 
-    def evaluate(get: Get, options: MatchOptions, lookups: MapLookups) -> Evaluated:
+    def evaluate(get: Lookup, options: MatchOptions, lookups: MapLookups) -> Evaluated:
         known = alone(get)
         values: dict[Identity, Value | FloatColumn | list[Value]] = {}
         holds, fails = known, np.zeros(1, np.bool_)
@@ -144,7 +144,7 @@ def _where_alone(forms: Sequence[ClosedForm], ranked: Sequence[tuple[Index, Sele
             found = form.evaluate(get, options, lookups)
             holds, fails = holds & np.asarray(found.holds), fails | (known & np.asarray(found.fails))
             values |= found.values
-        values |= {index.identity: 0.0 for index, _ in ranked}
+        values |= {index.identity: 0.0 for index, _ in ranks}
         if isinstance(get, Columns):
             truths = [np.broadcast_to(each, get.size).tolist() for each in (holds, fails)]
             return Evaluated(truths[0], truths[1], values)

@@ -18,7 +18,7 @@ from scenicq.geometry.road_direction import RoadDirection
 from scenicq.limits import LIMITS
 from scenicq.match.decide.closed_form import ClosedForm, Evaluated, each_position
 from scenicq.match.decide.compiled_expressions import CompiledExpressions
-from scenicq.match.decide.range_forms import Columns, FloatColumn, Form, Get, Scalar, by_option, clipped, spread
+from scenicq.match.decide.range_forms import Columns, FloatColumn, Form, Lookup, Scalar, by_option, clip, spread
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.evaluation import unlike
 from scenicq.match.problem.map_lookups import MapLookups
@@ -68,14 +68,14 @@ def number(item: Comparison, known: Mapping[Identity, float]) -> ClosedForm | No
     if not cases or any(case.form.fields for case in cases):
         return None
 
-    def evaluate(get: Get, options: MatchOptions, lookups: MapLookups) -> Evaluated:
+    def evaluate(get: Lookup, options: MatchOptions, lookups: MapLookups) -> Evaluated:
         margin, seen = options.tolerance.of(index, name), get(index, name)
         many, fails = isinstance(get, Columns), True
         if (many and len(cases) > 1) or not isinstance(seen, float | np.ndarray):
             raise CannotEvaluate("what a closed form does not say")
         for chosen, form in cases:
             known = form.known(get)
-            value = clipped(seen, known + form.low, known + form.high)
+            value = clip(seen, known + form.low, known + form.high)
             off = abs(value - seen)
             holds, misses = off <= margin.sure, off > margin.reach + SLACK
             if many or holds:
@@ -85,7 +85,7 @@ def number(item: Comparison, known: Mapping[Identity, float]) -> ClosedForm | No
 
     first = cases[0].form
 
-    def detail(get: Get, lookups: MapLookups) -> str:
+    def detail(get: Lookup, lookups: MapLookups) -> str:
         # what the cascade tries first is what it words
         return "" if first.terms else unlike(name, first.known(get), get(index, name))
 
@@ -111,7 +111,7 @@ def text(item: Comparison) -> ClosedForm | None:
         return None
     index, name = item.object, item.property
 
-    def evaluate(get: Get, options_: MatchOptions, lookups: MapLookups) -> Evaluated:
+    def evaluate(get: Lookup, options_: MatchOptions, lookups: MapLookups) -> Evaluated:
         if isinstance(get, Columns):
             raise CannotEvaluate("what a closed form does not say")
         seen = get(index, name)
@@ -145,7 +145,7 @@ def heading(item: Comparison, known: Mapping[Identity, float]) -> ClosedForm | N
     flow = along.field.value if along is not None and isinstance(along.field, Constant) else None
     where = cast(Feature, along.point).object if flow is not None and along is not None else -1
 
-    def evaluate(get: Get, options: MatchOptions, lookups: MapLookups) -> Evaluated:
+    def evaluate(get: Lookup, options: MatchOptions, lookups: MapLookups) -> Evaluated:
         margin, seen = options.tolerance.of(index, "heading"), cast(float, get(index, "heading"))
         many, fails = isinstance(get, Columns), True
         if many and len(choices) > 1:
@@ -167,12 +167,12 @@ def heading(item: Comparison, known: Mapping[Identity, float]) -> ClosedForm | N
             beyond = abs(off) - half
             holds, misses = beyond <= margin.sure, beyond > margin.reach + SLACK
             if many or holds:
-                values = spread(form, middle + clipped(off, -half, half))
+                values = spread(form, middle + clip(off, -half, half))
                 return Evaluated(holds, misses, chosen | values if chosen else values)
             fails = fails and misses
         return Evaluated(False, fails, {})
 
-    def detail(get: Get, lookups: MapLookups) -> str:
+    def detail(get: Lookup, lookups: MapLookups) -> str:
         # what the cascade tries first is what it words
         if first.terms:
             return ""
@@ -206,7 +206,7 @@ def _turn(angle: float, allowed: Sequence[float], half: float, sure: float) -> f
 
 def _directions(
     node: DirectionAt, known: Mapping[Identity, float]
-) -> Callable[[Get, MapLookups], list[tuple[float, ...]]] | None:
+) -> Callable[[Lookup, MapLookups], list[tuple[float, ...]]] | None:
     """The directions of roads, or of the lane that is meant, at an observed position; None for other fields."""
     if not isinstance(node.point, Feature) or node.point.property != "position":
         return None
@@ -222,7 +222,7 @@ def _directions(
     if len(fields) < len(node.field.options):
         return None
 
-    def directions(get: Get, lookups: MapLookups) -> list[tuple[float, ...]]:
+    def directions(get: Lookup, lookups: MapLookups) -> list[tuple[float, ...]]:
         places = each_position(get(where, "position"))
         found: list[tuple[float, ...]] = [()] * len(places)
         for option, mine in by_option(picked, get, len(places)):

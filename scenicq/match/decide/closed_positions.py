@@ -13,7 +13,7 @@ from scenicq.forest.groups import Comparison
 from scenicq.forest.nodes import Identity, PointIn, Rotate, Value, VectorOf, VectorSum
 from scenicq.match.decide.closed_form import FAILS, ClosedForm, Evaluated, each_position
 from scenicq.match.decide.compiled_expressions import CompiledExpressions
-from scenicq.match.decide.range_forms import Columns, CompiledVector, FloatColumn, Get, Scalar, clipped, spread, turned
+from scenicq.match.decide.range_forms import Columns, CompiledVector, FloatColumn, Lookup, Scalar, clip, cos_sin, spread
 from scenicq.match.decide.region_tests import region_test
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.evaluation import unlike
@@ -39,7 +39,7 @@ def point_in(item: Comparison, node: PointIn, ego: int, chosen: Mapping[Identity
     if test is None:
         return None
 
-    def evaluate(get: Get, options: MatchOptions, lookups: MapLookups) -> Evaluated:
+    def evaluate(get: Lookup, options: MatchOptions, lookups: MapLookups) -> Evaluated:
         position = get(index, "position")
         holds, fails = test.evaluate(get, position, lookups, options.tolerance.of(index, "position").reach + SLACK)
         places = each_position(position)
@@ -65,11 +65,11 @@ def known_vector(item: Comparison) -> ClosedForm | None:
         return None
     index, name = item.object, item.property
 
-    def evaluate(get: Get, options: MatchOptions, lookups: MapLookups) -> Evaluated:
+    def evaluate(get: Lookup, options: MatchOptions, lookups: MapLookups) -> Evaluated:
         (x, y), (px, py) = cast(XY, exact(get)), cast(XY, get(index, name))
         return Evaluated(*_close(x - px, y - py, options.tolerance.of(index, name)), {})
 
-    def detail(get: Get, lookups: MapLookups) -> str:
+    def detail(get: Lookup, lookups: MapLookups) -> str:
         return unlike(name, cast(XY, exact(get)), cast(XY, get(index, name)))
 
     return ClosedForm(item, evaluate, detail=detail)
@@ -145,7 +145,7 @@ def offset(item: Comparison) -> ClosedForm | None:
         return None
     index, name = item.object, item.property
 
-    def evaluate(get: Get, options: MatchOptions, lookups: MapLookups) -> Evaluated:
+    def evaluate(get: Lookup, options: MatchOptions, lookups: MapLookups) -> Evaluated:
         px, py = cast(XY, get(index, name))
         margin = options.tolerance.of(index, name)
         turns: list[XY] = []
@@ -155,13 +155,13 @@ def offset(item: Comparison) -> ClosedForm | None:
                 qx, qy = shift(get)
                 px, py = px - qx, py - qy
             elif angle is not None:
-                c, s = turned(angle(get))
+                c, s = cos_sin(angle(get))
                 px, py = px * c + py * s, py * c - px * s
                 turns.append((c, s))
         # hundreds of candidates come here: most offsets have no known part to work out
         a = x.known(get) if x.parts else x.constant
         b = y.known(get) if y.parts else y.constant
-        u, v = clipped(px, a + x.low, a + x.high), clipped(py, b + y.low, b + y.high)
+        u, v = clip(px, a + x.low, a + x.high), clip(py, b + y.low, b + y.high)
         holds, fails = _close(u - px, v - py, margin)
         if margin.kind == "box" and holds is not True and fails is not True:
             middle = a + (x.low + x.high) / 2 - px, b + (y.low + y.high) / 2 - py

@@ -1,4 +1,8 @@
-"""Expressions made into functions of what a label observes: exact ones, and sums of a known part and random ranges."""
+"""Compile expressions to functions of what a label observes.
+
+An *exact* function gives the value where everything random is known. A `Form` is a known part plus ranges of random
+numbers. Both are for many labels at once: what is observed comes as numbers, or as columns.
+"""
 
 from __future__ import annotations
 
@@ -47,30 +51,31 @@ from scenicq.match.decide.range_forms import (
     CompiledVector,
     Exact,
     Form,
-    Get,
+    Lookup,
     Scalar,
-    turned,
+    cos_sin,
 )
 from scenicq.match.linear.affine_reach import ends
 
-__all__ = ["VECTORS", "CompiledExpressions", "element_field", "truth"]
+__all__ = ["VECTORS", "CompiledExpressions", "compile_condition", "element_field"]
 
 _NUMBERS = frozenset({"heading", "width", "length", "height", "speed"})
-_WAYS = frozenset({GOING, LAST_LANE})
+_LANE_RULE = frozenset({GOING, LAST_LANE})
 VECTORS = frozenset({"position", "velocity"})
 """Properties that are numbers and pairs wherever they are observed."""
 
 
-def truth(root: Node, chosen: Mapping[Identity, float]) -> Callable[[Get], bool] | None:
-    """A condition on what is observed alone as a function of it, which raises `CannotEvaluate` where it has no value.
-
-    None if anything else about it is random or it takes too many steps.
+def compile_condition(root: Node, chosen: Mapping[Identity, float]) -> Callable[[Lookup], bool] | None:
+    """Compile a condition on what is observed alone; the function raises `CannotEvaluate` where it has no value.
 
     Args:
         root: The condition.
         chosen: The number of the option of each choice.
+
+    Returns:
+        The function; None if the condition reads anything else that is random, or takes too many steps.
     """
-    made: dict[int, Callable[[Get], Value]] = {}
+    made: dict[int, Callable[[Lookup], Value]] = {}
     steps: dict[int, int] = {}
     for node in postorder((root,)):
         below = children(node)
@@ -87,33 +92,35 @@ def truth(root: Node, chosen: Mapping[Identity, float]) -> Callable[[Get], bool]
             continue
         if isinstance(node, Feature) and node.object == PARAMS:
             return None
-        made[id(node)] = _computed(node, [made[id(child)] for child in below])
+        made[id(node)] = _compile_node(node, [made[id(child)] for child in below])
     whole = made[id(root)]
     return lambda get: bool(whole(get))
 
 
 def element_field(node: Node) -> ElementAtPoint | None:
-    """The field that a node asks which element lies at a point, if it does."""
+    """The field of a node that asks which element lies at a point; None for any other node."""
     if isinstance(node, DirectionAt) and isinstance(node.field, Constant):
         return node.field.value if isinstance(node.field.value, ElementAtPoint) else None
     return None
 
 
-def _constant(value: Value) -> Callable[[Get], Value]:
+def _constant(value: Value) -> Callable[[Lookup], Value]:
     return lambda _: value
 
 
-def _element_at(field: ElementAtPoint, point: CompiledVector, going: Sequence[Callable[[Get], Value]]) -> Scalar:
-    """The number, as an angle, of the element that lies at a point; of columns, a column.
+def _compile_element_at(
+    field: ElementAtPoint, point: CompiledVector, going: Sequence[Callable[[Lookup], Value]]
+) -> Scalar:
+    """Compile the look-up of the element that lies at a point; its number comes as an angle.
 
     Args:
         field: The field.
         point: The point.
-        going: The heading of who is there and the last lane of its track, where they matter; where there is none, None
-            and in columns nan.
+        going: The heading of the object there and the last lane of its track, where they matter; None where there is
+            none, in columns nan.
     """
 
-    def angle(get: Get) -> float:
+    def angle(get: Lookup) -> float:
         x, y = point(get)
         way, last = [each(get) for each in going] or (None, None)
         if isinstance(get, Columns):
@@ -129,21 +136,23 @@ def _element_at(field: ElementAtPoint, point: CompiledVector, going: Sequence[Ca
     return angle
 
 
-def _computed(node: Node, args: Sequence[Callable[[Get], Value]]) -> Callable[[Get], Value]:
-    """A node's own meaning as a function of what is observed."""
+def _compile_node(node: Node, args: Sequence[Callable[[Lookup], Value]]) -> Callable[[Lookup], Value]:
+    """Compile a node by its plain meaning, from the functions of its children."""
     match node:
         case Constant():
             return _constant(node.value)
         case DirectionAt() if (field := element_field(node)) is not None:
-            return cast("Callable[[Get], Value]", _element_at(field, cast(CompiledVector, args[1]), args[2:]))
+            return cast(
+                "Callable[[Lookup], Value]", _compile_element_at(field, cast(CompiledVector, args[1]), args[2:])
+            )
         case Select():
             which, *options = args
             return lambda get: options[int(cast(float, which(get)))](get)
-        case Feature(object=index, property=name) if name in VECTORS | _NUMBERS | _WAYS:
+        case Feature(object=index, property=name) if name in VECTORS | _NUMBERS | _LANE_RULE:
             return lambda get: get(index, name)
         case Feature(object=index, property=name):
 
-            def observed(get: Get) -> Value:
+            def observed(get: Lookup) -> Value:
                 found = as_kind(node, get(index, name))
                 if isinstance(found, Undefined):
                     raise CannotEvaluate("what a closed form does not say")
@@ -152,7 +161,7 @@ def _computed(node: Node, args: Sequence[Callable[[Get], Value]]) -> Callable[[G
             return observed
         case _:
 
-            def computed(get: Get) -> Value:
+            def computed(get: Lookup) -> Value:
                 if isinstance(get, Columns):
                     raise CannotEvaluate("what a closed form does not say")
                 found = compute(node, tuple([arg(get) for arg in args]))
@@ -164,7 +173,7 @@ def _computed(node: Node, args: Sequence[Callable[[Get], Value]]) -> Callable[[G
 
 
 class CompiledExpressions:
-    """Formulas of expressions, given the options of discrete choices."""
+    """Compiles expressions, each once, for one outcome of the discrete choices."""
 
     def __init__(self, chosen: Mapping[Identity, float]) -> None:
         """Take the number of the option of each choice."""
@@ -174,26 +183,26 @@ class CompiledExpressions:
         self._forms: dict[int, Form | None] = {}
 
     def exact(self, root: Node) -> Exact | None:
-        """A scalar or vector as a function of what is observed; None if it is not one alone."""
+        """Compile a scalar or vector; None if it depends on more than what is observed."""
         for node in postorder((root,)):
             if id(node) not in self._exact:
                 below = children(node)
                 steps = self._steps[id(node)] = 1 + sum([self._steps[id(child)] for child in below])
                 args = [self._exact[id(child)] for child in below]
-                self._exact[id(node)] = self._exactly(node, args) if steps <= LIMITS.closed_form_terms else None
+                self._exact[id(node)] = self._compile_exact(node, args) if steps <= LIMITS.closed_form_terms else None
         return self._exact[id(root)]
 
-    def _exactly(self, node: Node, args: list[Exact | None]) -> Exact | None:
+    def _compile_exact(self, node: Node, args: list[Exact | None]) -> Exact | None:
         match node:
             case Index():
                 return cast(Exact, _constant(self._chosen[node.identity])) if node.identity in self._chosen else None
             case Select(index=Index() as index):
                 return args[1 + int(self._chosen[index.identity])] if index.identity in self._chosen else None
             case _:
-                return _exact(node, args)
+                return _exact_operation(node, args)
 
     def form(self, root: Node) -> Form | None:
-        """A scalar as a form; None if it is none."""
+        """Compile a scalar to a form; None if it has none."""
         self.exact(root)
         for node in postorder((root,)):
             if id(node) not in self._forms:
@@ -221,7 +230,7 @@ class CompiledExpressions:
             case DirectionAt() if element_field(node) is None:
                 return Form(fields=(node,))
             case Arithmetic() if all(arg is not None for arg in args):
-                found = _combined(node.op, cast("list[Form]", args))
+                found = _combine_forms(node.op, cast("list[Form]", args))
                 if found is not None:
                     return found
             case _:
@@ -233,7 +242,7 @@ class CompiledExpressions:
         return Form(parts=((1.0, cast(Scalar, exact)),)) if exact is not None and is_scalar else None
 
 
-def _combined(op: ArithmeticOp, args: list[Form]) -> Form | None:
+def _combine_forms(op: ArithmeticOp, args: list[Form]) -> Form | None:
     match op:
         case ArithmeticOp.ADD:
             total: Form | None = args[0]
@@ -256,34 +265,34 @@ def _combined(op: ArithmeticOp, args: list[Form]) -> Form | None:
             return None
 
 
-def _exact(node: Node, args: list[Exact | None]) -> Exact | None:
+def _exact_operation(node: Node, args: list[Exact | None]) -> Exact | None:
     match node:
         case Constant():
             value = node.value
             return (lambda _: value) if isinstance(value, float | tuple) else None
         case Feature():
             index, name = node.object, node.property
-            fits = name in (VECTORS if node.kind == "vector" else _NUMBERS) or name in _WAYS
+            fits = name in (VECTORS if node.kind == "vector" else _NUMBERS) or name in _LANE_RULE
 
-            def observed(get: Get) -> Value:
+            def observed(get: Lookup) -> Value:
                 return get(index, name)
 
             return cast(Exact, observed) if fits else None
         case DirectionAt() if (field := element_field(node)) is not None and None not in args[1:]:
-            ways = cast("list[Callable[[Get], Value]]", args[2:])
-            return cast(Exact, _element_at(field, cast(CompiledVector, args[1]), ways))
+            ways = cast("list[Callable[[Lookup], Value]]", args[2:])
+            return cast(Exact, _compile_element_at(field, cast(CompiledVector, args[1]), ways))
         case _ if any(arg is None for arg in args):
             return None
         case Arithmetic():
-            own = _scalar(node.op, cast("list[Scalar]", args))
-            return own or cast(Exact, _computed(node, cast("list[Callable[[Get], Value]]", args)))
+            own = _scalar_operation(node.op, cast("list[Scalar]", args))
+            return own or cast(Exact, _compile_node(node, cast("list[Callable[[Lookup], Value]]", args)))
         case VectorOf():
             x, y = cast("list[Scalar]", args)
             return lambda get: (x(get), y(get))
         case VectorSum():
             one, other = cast("list[CompiledVector]", args)
 
-            def added(get: Get) -> tuple[float, float]:
+            def added(get: Lookup) -> tuple[float, float]:
                 (a, b), (c, d) = one(get), other(get)
                 return (a + c, b + d)
 
@@ -291,7 +300,7 @@ def _exact(node: Node, args: list[Exact | None]) -> Exact | None:
         case Scale():
             vector, by = cast(CompiledVector, args[0]), cast(Scalar, args[1])
 
-            def scaled(get: Get) -> tuple[float, float]:
+            def scaled(get: Lookup) -> tuple[float, float]:
                 (a, b), factor = vector(get), by(get)
                 return (a * factor, b * factor)
 
@@ -299,8 +308,8 @@ def _exact(node: Node, args: list[Exact | None]) -> Exact | None:
         case Rotate():
             whole, angle = cast(CompiledVector, args[0]), cast(Scalar, args[1])
 
-            def rotated(get: Get) -> tuple[float, float]:
-                (a, b), (c, s) = whole(get), turned(angle(get))
+            def rotated(get: Lookup) -> tuple[float, float]:
+                (a, b), (c, s) = whole(get), cos_sin(angle(get))
                 return (a * c - b * s, a * s + b * c)
 
             return rotated
@@ -308,12 +317,12 @@ def _exact(node: Node, args: list[Exact | None]) -> Exact | None:
             vector, axis = cast(CompiledVector, args[0]), node.axis
             return lambda get: vector(get)[axis]
         case Norm() | Bearing():
-            return cast(Exact, _computed(node, cast("list[Callable[[Get], Value]]", args)))
+            return cast(Exact, _compile_node(node, cast("list[Callable[[Lookup], Value]]", args)))
         case _:
             return None
 
 
-def _scalar(op: ArithmeticOp, args: list[Scalar]) -> Scalar | None:
+def _scalar_operation(op: ArithmeticOp, args: list[Scalar]) -> Scalar | None:
     match op:
         case ArithmeticOp.ADD:
             # `sum` of floats is not plain addition in every Python

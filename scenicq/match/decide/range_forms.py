@@ -20,25 +20,25 @@ __all__ = [
     "Exact",
     "FloatColumn",
     "Form",
-    "Get",
+    "Lookup",
     "Scalar",
     "by_option",
-    "clipped",
+    "clip",
+    "cos_sin",
     "spread",
-    "turned",
 ]
 
-Get: TypeAlias = Callable[[int, str], Value]
+Lookup: TypeAlias = Callable[[int, str], Value]
 """The observed value of an object's property."""
 FloatColumn: TypeAlias = NDArray[np.float64]
 """A number of each of many labels; a vector is a pair of columns."""
-Exact: TypeAlias = Callable[[Get], "float | tuple[float, float]"]
-Scalar: TypeAlias = Callable[[Get], float]
-CompiledVector: TypeAlias = Callable[[Get], "tuple[float, float]"]
+Exact: TypeAlias = Callable[[Lookup], "float | tuple[float, float]"]
+Scalar: TypeAlias = Callable[[Lookup], float]
+CompiledVector: TypeAlias = Callable[[Lookup], "tuple[float, float]"]
 
 
 class Columns:
-    """The observed values of many labels at once, in place of a `Get`: formulas of it give columns.
+    """The observed values of many labels at once, in place of a `Lookup`: formulas of it give columns.
 
     Every step is what it is for one label, bit by bit: NumPy adds, subtracts, multiplies and divides; the functions
     that it computes in a way of its own are applied one by one.
@@ -59,7 +59,7 @@ class Columns:
         return cast(Value, self._column(index, name))
 
     def some(self, which: NDArray[np.intp]) -> Columns:
-        """The same of some of the labels, by their numbers."""
+        """Select some of the labels, by their numbers."""
 
         def column(index: int, name: str) -> FloatColumn | tuple[FloatColumn, FloatColumn]:
             found = self._column(index, name)
@@ -68,7 +68,7 @@ class Columns:
         return Columns(len(which), column)
 
 
-def by_option(number: Scalar, get: Get, size: int) -> Iterator[tuple[int, NDArray[np.intp]]]:
+def by_option(number: Scalar, get: Lookup, size: int) -> Iterator[tuple[int, NDArray[np.intp]]]:
     """The options that a number picks for labels, each with the numbers of those labels.
 
     Args:
@@ -81,7 +81,7 @@ def by_option(number: Scalar, get: Get, size: int) -> Iterator[tuple[int, NDArra
         yield option, np.flatnonzero(meant == option)
 
 
-def turned(angle: float) -> tuple[float, float]:
+def cos_sin(angle: float) -> tuple[float, float]:
     """Cosine and sine; of a column, columns."""
     if isinstance(angle, np.ndarray):
         angles: list[float] = angle.tolist()
@@ -89,7 +89,7 @@ def turned(angle: float) -> tuple[float, float]:
     return math.cos(angle), math.sin(angle)
 
 
-def clipped(value: float, low: float, high: float) -> float:
+def clip(value: float, low: float, high: float) -> float:
     """The value, or the end that it is beyond; of columns, a column."""
     if isinstance(value, np.ndarray):
         raised = np.where(np.greater(low, value), low, value)
@@ -124,7 +124,7 @@ class Form:
         object.__setattr__(self, "low", math.fsum(low for low, _ in products))
         object.__setattr__(self, "high", math.fsum(high for _, high in products))
 
-    def known(self, get: Get) -> float:
+    def known(self, get: Lookup) -> float:
         """The known part."""
         total = self.constant
         for factor, part in self.parts:
@@ -170,11 +170,11 @@ def spread(form: Form, value: float) -> dict[Identity, Value]:
         return {}
     if len(form.terms) == 1:
         ((identity, (factor, low, high)),) = form.terms.items()
-        return {identity: clipped(value / factor, low, high)}
+        return {identity: clip(value / factor, low, high)}
     if form.unbounded:
         # the unbounded one takes what the middles of the others leave
         return _with_rest(form, value)
-    share = 0.5 if form.high == form.low else clipped((value - form.low) / (form.high - form.low), 0.0, 1.0)
+    share = 0.5 if form.high == form.low else clip((value - form.low) / (form.high - form.low), 0.0, 1.0)
     return {
         identity: low + share * (high - low) if factor > 0 else high - share * (high - low)
         for identity, (factor, low, high) in form.terms.items()

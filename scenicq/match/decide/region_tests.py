@@ -32,14 +32,14 @@ from scenicq.geometry.shape_distances import to_discs, to_rectangles, to_sectors
 from scenicq.limits import LIMITS
 from scenicq.match.decide.closed_form import each_position
 from scenicq.match.decide.compiled_expressions import CompiledExpressions
-from scenicq.match.decide.range_forms import Columns, Exact, Get, Scalar, by_option
+from scenicq.match.decide.range_forms import Columns, Exact, Lookup, Scalar, by_option
 from scenicq.match.problem.map_lookups import XY, MapLookups
 
 __all__ = ["RegionTest", "region_test"]
 
 
 _Truths: TypeAlias = "bool | NDArray[np.bool_]"
-_Test: TypeAlias = Callable[[Get, Value, MapLookups, float], "tuple[_Truths, _Truths]"]
+_Test: TypeAlias = Callable[[Lookup, Value, MapLookups, float], "tuple[_Truths, _Truths]"]
 """From what is observed, a position, what is known of the map and the tolerance, whether the position surely lies in a
 region, and whether it surely lies further than the tolerance from it; of columns, columns."""
 
@@ -91,7 +91,7 @@ def region_test(root: Node, chosen: Mapping[Identity, float]) -> RegionTest | No
 
 
 def _constant(region: Region) -> _Test:
-    def test(get: Get, position: Value, lookups: MapLookups, reach: float) -> tuple[_Truths, _Truths]:
+    def test(get: Lookup, position: Value, lookups: MapLookups, reach: float) -> tuple[_Truths, _Truths]:
         places = each_position(position)
         held = np.array(lookups.within(region, places), dtype=np.bool_)
         missed = np.zeros(len(places), dtype=np.bool_)
@@ -104,7 +104,7 @@ def _constant(region: Region) -> _Test:
 def _selected(number: Scalar, tests: list[_Test | None]) -> _Test:
     """Each place in the region that is meant there; nothing is said where that is none or has no test."""
 
-    def test(get: Get, position: Value, lookups: MapLookups, reach: float) -> tuple[_Truths, _Truths]:
+    def test(get: Lookup, position: Value, lookups: MapLookups, reach: float) -> tuple[_Truths, _Truths]:
         if not isinstance(get, Columns):
             one = tests[round(number(get))]
             return (False, False) if one is None else one(get, position, lookups, reach)
@@ -127,7 +127,7 @@ def _placed(node: DiscAt | SectorAt | RectangleAt, known: list[Exact | None]) ->
     of_many = {DiscAt: to_discs, SectorAt: to_sectors, RectangleAt: to_rectangles}[type(node)]
     kind = {DiscAt: Disc, SectorAt: Sector, RectangleAt: Rectangle}[type(node)]
 
-    def test(get: Get, position: Value, lookups: MapLookups, reach: float) -> tuple[_Truths, _Truths]:
+    def test(get: Lookup, position: Value, lookups: MapLookups, reach: float) -> tuple[_Truths, _Truths]:
         (x, y), given = cast(XY, center(get)), [number(get) for number in numbers]
         px, py = cast(XY, position)
         if isinstance(get, Columns):
@@ -143,7 +143,7 @@ def _combined(node: RegionUnion | RegionIntersection | RegionDifference, tests: 
     if isinstance(node, RegionDifference):
         base, removed = tests
 
-        def without(get: Get, position: Value, lookups: MapLookups, reach: float) -> tuple[_Truths, _Truths]:
+        def without(get: Lookup, position: Value, lookups: MapLookups, reach: float) -> tuple[_Truths, _Truths]:
             held, missed = base(get, position, lookups, reach)
             # whoever is surely off what is removed, by whatever little
             _, off = removed(get, position, lookups, 0.0)
@@ -152,7 +152,7 @@ def _combined(node: RegionUnion | RegionIntersection | RegionDifference, tests: 
         return without
     each_holds = isinstance(node, RegionIntersection)
 
-    def test(get: Get, position: Value, lookups: MapLookups, reach: float) -> tuple[_Truths, _Truths]:
+    def test(get: Lookup, position: Value, lookups: MapLookups, reach: float) -> tuple[_Truths, _Truths]:
         held, missed = tests[0](get, position, lookups, reach)
         for one in tests[1:]:
             also, off = one(get, position, lookups, reach)

@@ -17,7 +17,7 @@ from scenicq.forest.nodes import Constant, Identity, Leaf, Node, Value
 from scenicq.forest.walk import deciding_first
 from scenicq.limits import LIMITS
 from scenicq.match.options import MatchOptions
-from scenicq.match.problem.conditioned import Item, conditioned, options_of
+from scenicq.match.problem.conditioned import Item, condition_items, options_of
 from scenicq.match.problem.evaluation import holds, replay
 from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:  # takes long to load, and most queries ask no solver
     from scenicq.smt.answer import Solver
     from scenicq.smt.encode import Encoding, Target
 
-__all__ = ["AskSolver", "ask", "discrete_options", "encoded"]
+__all__ = ["AskSolver", "ask", "discrete_options", "encode_groups"]
 
 _REFINED = 100.0
 
@@ -38,7 +38,7 @@ class AskSolver(Protocol):
         ...
 
 
-def encoded(items: Sequence[Sequence[Item]], options: MatchOptions, *, borders: bool = True) -> Encoding:
+def encode_groups(items: Sequence[Sequence[Item]], options: MatchOptions, *, borders: bool = True) -> Encoding:
     """Groups as one problem for a solver.
 
     Args:
@@ -100,7 +100,7 @@ def _ask_for_each(items: Sequence[Sequence[Item]], options: MatchOptions, solver
         for number in reversed(numbers):
             chosen: dict[Identity, Value] = {leaf.identity: float(number)}
             memo: dict[int, Node] = {}
-            todo.append(([conditioned(group, chosen, memo=memo) for group in asked], given | chosen))
+            todo.append(([condition_items(group, chosen, memo=memo) for group in asked], given | chosen))
     return blamed
 
 
@@ -123,14 +123,14 @@ def _ask_once(items: Sequence[Sequence[Item]], options: MatchOptions, solver: So
     from scenicq.smt.case_split import check_by_cases  # noqa: PLC0415
 
     try:
-        encoding = encoded(items, options, borders=False)
+        encoding = encode_groups(items, options, borders=False)
     except CannotEvaluate as error:
         return Undecided(blame, f"unsupported: {error}")
     precision = options.precision
     for attempt in range(LIMITS.solver_attempts):
         if attempt == 1:
             # what was left out to keep the question small may be what the witness breaks
-            encoding = encoded(items, options)
+            encoding = encode_groups(items, options)
         with waiting(options.timeout_s) as left_s:
             answer = check_by_cases(solver, encoding.problem, precision=precision, timeout_s=left_s)
         match answer:

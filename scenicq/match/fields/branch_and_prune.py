@@ -13,7 +13,7 @@ import numpy as np
 
 from scenicq.budget import Exhausted, look
 from scenicq.forest.walk import leaves
-from scenicq.limits import LIMITS, exhausted
+from scenicq.limits import LIMITS, limit_exceeded
 from scenicq.match.fields.constraint_network import ConstraintNetwork
 from scenicq.match.fields.contractor import BoxSet
 from scenicq.match.fields.heading_propagation import branch, propagated
@@ -78,6 +78,6 @@ def _boxes(start: BoxSet) -> Iterator[BoxSet]:
             if left.size:
                 seen += left.size
                 if seen > LIMITS.pruned_boxes:
-                    raise exhausted("pruned_boxes")
+                    raise limit_exceeded("pruned_boxes")
                 yield left
                 todo.append(left)

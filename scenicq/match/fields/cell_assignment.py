@@ -28,7 +28,7 @@ from scenicq.match.linear.affine_forms import Affine, AffineVector, affine_scala
 from scenicq.match.linear.linear_program import Row
 from scenicq.match.linear.linear_relaxation import extent_affine, solve_affine
 from scenicq.match.linear.region_rows import Alternative, polygon_rows
-from scenicq.match.problem.conditioned import Item, conditioned
+from scenicq.match.problem.conditioned import Item, condition_items
 from scenicq.match.problem.evaluation import holds, replay
 from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
 from scenicq.match.tolerance import SLACK, Tolerance
@@ -157,7 +157,7 @@ def assignment_of(cases: BoxSet, number: int, shared: Identity | None) -> Headin
         if not near:
             return None
         pointing.append((node, box, near))
-    items = conditioned(network.items, given, memo=memo)
+    items = condition_items(network.items, given, memo=memo)
     if any(isinstance(node, Constant) and not holds(c, node.value, seen, network.tolerance) for c, node, seen in items):
         return None
     exact = all(_is_affine(node, seen) for c, node, seen in items if isinstance(c, Comparison))

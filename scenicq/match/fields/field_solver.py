@@ -24,7 +24,7 @@ from scenicq.match.fields.contractor import BoxSet
 from scenicq.match.fields.heading_propagation import DirectedCases, KnownCases, bisected, directed, propagated
 from scenicq.match.fields.shared_variable import find_shared_value, joined
 from scenicq.match.fields.witness_search import THOROUGH, find_witness
-from scenicq.match.problem.conditioned import Item, conditioned
+from scenicq.match.problem.conditioned import Item, condition_items
 from scenicq.match.problem.outcome import Outcome, Patience, Refuted, Satisfied, SearchSteps, Undecided, finish
 from scenicq.match.tolerance import Tolerance
 
@@ -185,7 +185,7 @@ def repaired(items: Sequence[Item], near: Mapping[Identity, Value], tolerance: T
     given = {identity: near[identity] for identity in discrete if identity in near}
     if len(given) < len(set(discrete)):
         return None
-    network = ConstraintNetwork(conditioned(items, given), tolerance)
+    network = ConstraintNetwork(condition_items(items, given), tolerance)
     found = finish(_alone(BoxSet.around(network, near, _CLOSE), items[0][0], tolerance))
     return Satisfied({**given, **found.values}) if isinstance(found, Satisfied) else None
 

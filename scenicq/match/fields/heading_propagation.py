@@ -22,7 +22,7 @@ from scenicq.geometry.fields import VectorField
 from scenicq.geometry.occupancy import ElementAtPoint
 from scenicq.geometry.proximity import meets_many
 from scenicq.geometry.regions import Region
-from scenicq.limits import LIMITS, exhausted
+from scenicq.limits import LIMITS, limit_exceeded
 from scenicq.match.fields.cell_assignment import MARGIN, SAME
 from scenicq.match.fields.contractor import BoxSet
 
@@ -60,7 +60,7 @@ def directed(start: BoxSet, soon: float = math.inf) -> Iterator[BoxSet]:
             soon *= 4
         seen += cases.size
         if seen > LIMITS.heading_cases:
-            raise exhausted("heading_cases")
+            raise limit_exceeded("heading_cases")
         cases = propagated(cases)
         if not cases.size:
             continue
@@ -137,7 +137,7 @@ def bisected(cases: BoxSet, below: Sequence[Leaf]) -> list[BoxSet]:
     """
     found = _widest(cases, below)
     if found is None or found[0] <= LIMITS.heading_width:
-        raise exhausted("heading_width")
+        raise limit_exceeded("heading_width")
     return _halves(cases, *found[1:])
 
 

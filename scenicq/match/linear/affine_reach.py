@@ -40,7 +40,7 @@ class Reach:
 
     Attributes:
         possible: Yes, no, or not decided here.
-        values: Of the random variables, if yes.
+        values: Values of the random variables, if it is satisfiable.
     """
 
     possible: bool | None
@@ -121,7 +121,7 @@ def reach_number(form: Affine, leaves: Mapping[Identity, Leaf], observed: float,
 
 
 def reach_heading(form: Affine, leaves: Mapping[Identity, Leaf], observed: float, tolerance: float) -> Reach:
-    """The same for a heading, modulo 2 pi."""
+    """`reach_number` for a heading, modulo 2 pi."""
     limits = _between(form, leaves)
     if limits is None:
         return _OPEN

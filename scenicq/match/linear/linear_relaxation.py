@@ -98,7 +98,7 @@ def solve_affine(
         rows: Linear facts that hold besides.
         tolerance: Per feature.
         places: Points that need values, too.
-        alternatives: Of each, one set of facts holds.
+        alternatives: Sets of facts, one of which holds, for each alternative.
 
     Raises:
         CannotEvaluate: Something is not affine, or lies between the inner and the outer polygons.

@@ -1,4 +1,8 @@
-"""Which label objects may play which role, before anything about positions is looked at: class, radius, number."""
+"""The candidates of each role: the label objects that may play it by their class and their distance from the ego.
+
+A role is an object of the scenario. Label objects go by their number in the label: 0 is the label's ego, 1 the first of
+its other objects. Positions and requirements are not looked at here; the search (`match/search`) does that.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +13,7 @@ from dataclasses import dataclass
 from scenicq.forest.among import LabelElements
 from scenicq.forest.nodes import COURSE, Value
 from scenicq.forest.scenario import Scenario
-from scenicq.limits import LIMITS, exhausted
+from scenicq.limits import LIMITS, limit_exceeded
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.bipartite_matching import Slot, matchable
 from scenicq.match.problem.constraints import Signature
@@ -18,19 +22,27 @@ from scenicq.match.verdict import Cause
 from scenicq.store.classes import Granularity, class_matches
 from scenicq.store.labels import Label
 
-__all__ = ["Candidates", "LabelProblem", "candidates_of", "egos", "find_candidates", "nearest_first", "ranks"]
+__all__ = [
+    "Candidates",
+    "LabelProblem",
+    "candidates_of",
+    "possible_egos",
+    "prepare_label",
+    "rank_by_distance",
+    "sort_by_distance",
+]
 
 Candidates = Mapping[int, tuple[int, ...]]
-"""For objects of the scenario, the numbers of the label objects that may play them: all others are excluded."""
+"""For roles, by the object's index in the scenario, the numbers of the label objects that may play them."""
 
 
-def ranks(label: Label, ego: int, candidates: Iterable[Iterable[int]]) -> dict[int, int]:
-    """In which order label objects are tried: the nearest to the ego first, of equally near ones by their ids.
+def rank_by_distance(label: Label, ego: int, candidates: Iterable[Iterable[int]]) -> dict[int, int]:
+    """The rank of each candidate by its distance from the ego, 0 for the nearest; equally near ones go by their ids.
 
     Args:
         label: The label.
         ego: Number of the label object that plays the ego.
-        candidates: Numbers of label objects, for each object of the scenario.
+        candidates: Numbers of label objects, for each role.
     """
     objects = (label.ego, *label.objects)
     x, y = objects[ego].x, objects[ego].y
@@ -44,29 +56,32 @@ def ranks(label: Label, ego: int, candidates: Iterable[Iterable[int]]) -> dict[i
     return {number: rank for rank, number in enumerate(ordered)}
 
 
-def nearest_first(label: Label, ego: int, candidates: Candidates) -> Candidates:
-    """Candidates in the order in which they are tried; arguments as of `ranks`."""
+def sort_by_distance(label: Label, ego: int, candidates: Candidates) -> Candidates:
+    """The candidates of each role, the nearest to the ego first: the order in which they are tried."""
     if all(len(numbers) < 2 for numbers in candidates.values()):
         return candidates
-    rank = ranks(label, ego, candidates.values()).__getitem__
+    rank = rank_by_distance(label, ego, candidates.values()).__getitem__
     return {index: tuple(sorted(numbers, key=rank)) for index, numbers in candidates.items()}
+
+
+_Observed = tuple[frozenset[str], tuple[int, ...]]
+"""Names of properties, and the numbers of label objects of which these are observed."""
 
 
 @dataclass(slots=True, eq=False)
 class LabelProblem:
-    """A label made ready: its label objects by number (0 is the label's ego) and who may play whom.
+    """What the search for a correspondence needs of one label, for one choice of the ego.
 
     Attributes:
         label: The label.
         ego: Number of the label object that plays the scenario's ego.
-        seen: What is observed of each label object.
+        seen: What is observed of each label object, by its number.
         params: What is observed of the frame.
-        candidates: For each object of the scenario but the ego, the numbers of the label objects of its class, in the
-            order in which they are tried.
-        ranks: That order.
-        disc: The area that is looked at, if it is limited: centre and radius.
-        classes: How classes are compared.
-        elements: The label objects for conditions that go through all of them, once one has been asked.
+        candidates: The candidates of each role but the ego, in the order in which they are tried.
+        ranks: Place of each candidate in that order.
+        disc: Centre and radius of the area that is looked at, metres; None for everywhere.
+        classes: How finely classes are compared.
+        elements: The label objects for conditions that go through all of them, made when one first asks.
     """
 
     label: Label
@@ -82,84 +97,97 @@ class LabelProblem:
     def signatures(
         self, relevant: tuple[frozenset[str], ...]
     ) -> Iterator[tuple[Signature, dict[int, tuple[int, ...]]]]:
-        """Candidates split by what is observed of them, as far as it matters; one signature in most datasets.
+        """Split the candidates by which relevant properties are observed of them.
+
+        Most datasets observe the same of all objects: then there is one signature with all candidates.
+
+        Args:
+            relevant: For each role, the properties whose being observed makes a difference.
+
+        Yields:
+            A signature, with the candidates of each role that have it.
 
         Raises:
             Exhausted: There are too many combinations.
         """
-        choices: list[list[tuple[frozenset[str], tuple[int, ...]]]] = []
-        split: dict[tuple[frozenset[str], tuple[int, ...]], list[tuple[frozenset[str], tuple[int, ...]]]] = {}
+        choices: list[list[_Observed]] = []
+        splits: dict[_Observed, list[_Observed]] = {}
         for index, names in enumerate(relevant):
             key = names, self.candidates.get(index, (self.ego,))
-            if key not in split:
-                by_set: dict[frozenset[str], list[int]] = {}
-                for number in key[1]:
-                    by_set.setdefault(names.intersection(self.seen[number]), []).append(number)
-                # what is observed most completely first: the order must not depend on candidates that drop out anyway
-                ordered = sorted(by_set.items(), key=_completeness) if len(by_set) > 1 else by_set.items()
-                split[key] = [(names_, tuple(numbers)) for names_, numbers in ordered]
-            choices.append(split[key])
+            if key not in splits:
+                splits[key] = self._split(*key)
+            choices.append(splits[key])
         params = frozenset(self.params)
         for count, chosen in enumerate(itertools.product(*choices)):
             if count >= LIMITS.signatures:
-                raise exhausted("signatures")
-            yield (*(names for names, _ in chosen), params), {i: numbers for i, (_, numbers) in enumerate(chosen)}
+                raise limit_exceeded("signatures")
+            signature = (*(names for names, _ in chosen), params)
+            yield signature, {index: numbers for index, (_, numbers) in enumerate(chosen)}
+
+    def _split(self, names: frozenset[str], candidates: tuple[int, ...]) -> list[_Observed]:
+        """Group candidates by which of some properties are observed of them; the most completely observed first.
+
+        The order is one of properties, not of candidates: it must not depend on candidates that drop out anyway.
+        """
+        groups: dict[frozenset[str], list[int]] = {}
+        for number in candidates:
+            groups.setdefault(names.intersection(self.seen[number]), []).append(number)
+        ordered = sorted(groups, key=lambda group: (-len(group), sorted(group))) if len(groups) > 1 else groups
+        return [(group, tuple(groups[group])) for group in ordered]
 
 
-def _completeness(entry: tuple[frozenset[str], list[int]]) -> tuple[int, list[str]]:
-    return -len(entry[0]), sorted(entry[0])
-
-
-def egos(scenario: Scenario, label: Label, options: MatchOptions) -> list[int]:
-    """Numbers of the label objects that may play the ego: the label's own, or any of its class, if there are any."""
+def possible_egos(scenario: Scenario, label: Label, options: MatchOptions) -> list[int]:
+    """Numbers of the label objects that may play the ego: the label's own, and with `--ego any` all of its class."""
     own = [0] if label.has_ego else []
     if options.ego == "label":
         return own
-    wanted = scenario.objects[scenario.ego].category
+    category = scenario.objects[scenario.ego].category
     return own + [
-        number for number, each in enumerate(label.objects, 1) if class_matches(wanted, each.category, options.classes)
+        number
+        for number, each in enumerate(label.objects, 1)
+        if class_matches(category, each.category, options.classes)
     ]
 
 
-def find_candidates(
+def prepare_label(
     scenario: Scenario,
     label: Label,
     ego: int,
     options: MatchOptions,
-    given: Mapping[str, str],
-    among: Candidates | None = None,
+    fixed_roles: Mapping[str, str],
+    allowed: Candidates | None = None,
 ) -> LabelProblem | Cause:
-    """Who may play whom for one choice of ego, or what is lacking.
+    """State the problem of one label for one choice of its ego, or say which role cannot be filled.
 
     Args:
         scenario: The scenario.
         label: The label.
         ego: Number of the label object that plays the ego.
         options: The options.
-        given: Ids of label objects that are known to play objects, by the objects' names.
-        among: What is known of who may play whom, for the label's own ego.
+        fixed_roles: Ids of the label objects that play certain roles, by the names of the roles.
+        allowed: Candidates that are known already, for the label's own ego; roles that it lacks may have any.
     """
-    candidates = candidates_of(scenario, label, ego, options, given, among)
-    short = _short(candidates)
-    if short is not None:
-        owner, count = scenario.objects[short], len(candidates[short])
-        detail = f"only {count} {owner.category}" if count else f"no {owner.category}"
-        return Cause(f"{owner.name}.class", detail, owner.span, (short,))
+    candidates = candidates_of(scenario, label, ego, options, fixed_roles, allowed)
+    unfilled = _find_unfilled_role(candidates)
+    if unfilled is not None:
+        role, count = scenario.objects[unfilled], len(candidates[unfilled])
+        detail = f"only {count} {role.category}" if count else f"no {role.category}"
+        return Cause(f"{role.name}.class", detail, role.span, (unfilled,))
     if options.exact:
-        spare = len(_free(label, ego, options)) - len(candidates)
+        spare = len(_label_objects_in_reach(label, ego, options)) - len(candidates)
         if spare:
             return Cause("--exact", f"{spare} label objects are left over")
     label_objects = (label.ego, *label.objects)
     disc = None if options.radius is None else ((label_objects[ego].x, label_objects[ego].y), options.radius)
-    order = ranks(label, ego, candidates.values())
-    candidates = {index: tuple(sorted(numbers, key=order.__getitem__)) for index, numbers in candidates.items()}
+    ranks = rank_by_distance(label, ego, candidates.values())
+    candidates = {index: tuple(sorted(numbers, key=ranks.__getitem__)) for index, numbers in candidates.items()}
     seen = [*map(observe, label_objects)]
     for index, rules in course_rules(scenario).items():
         for number in candidates.get(index, (ego,)):
             course = observe_course(label, label_objects[number], rules)
             if course is not None:
                 seen[number] = {**seen[number], COURSE: course}
-    return LabelProblem(label, ego, tuple(seen), observe_params(label), candidates, order, disc, options.classes)
+    return LabelProblem(label, ego, tuple(seen), observe_params(label), candidates, ranks, disc, options.classes)
 
 
 def candidates_of(
@@ -167,31 +195,31 @@ def candidates_of(
     label: Label,
     ego: int,
     options: MatchOptions,
-    given: Mapping[str, str],
-    among: Candidates | None = None,
+    fixed_roles: Mapping[str, str],
+    allowed: Candidates | None = None,
 ) -> dict[int, tuple[int, ...]]:
-    """For each object but the scenario's ego, the numbers of the label objects of its class; as `find_candidates`."""
-    free = _free(label, ego, options)
+    """The candidates of each role but the ego: label objects of its class in reach; arguments as of `prepare_label`."""
+    in_reach = _label_objects_in_reach(label, ego, options)
     of_class: dict[str, tuple[int, ...]] = {}
     candidates: dict[int, tuple[int, ...]] = {}
-    for owner in scenario.objects:
-        if owner.index == scenario.ego:
+    for role in scenario.objects:
+        if role.index == scenario.ego:
             continue
-        found = of_class.get(owner.category)
-        if found is None:
-            found = tuple([number for number, kind in free if class_matches(owner.category, kind, options.classes)])
-            of_class[owner.category] = found
-        if owner.name in given:
-            wanted = given[owner.name]
-            found = tuple([number for number in found if number and label.objects[number - 1].id == wanted])
-        if among is not None and owner.index in among:
-            found = tuple([number for number in among[owner.index] if number in found])
-        candidates[owner.index] = found
+        numbers = of_class.get(role.category)
+        if numbers is None:
+            numbers = tuple([n for n, category in in_reach if class_matches(role.category, category, options.classes)])
+            of_class[role.category] = numbers
+        if role.name in fixed_roles:
+            id_ = fixed_roles[role.name]
+            numbers = tuple([number for number in numbers if number and label.objects[number - 1].id == id_])
+        if allowed is not None and role.index in allowed:
+            numbers = tuple([number for number in allowed[role.index] if number in numbers])
+        candidates[role.index] = numbers
     return candidates
 
 
-def _free(label: Label, ego: int, options: MatchOptions) -> list[tuple[int, str]]:
-    """The numbers and classes of the label objects within the radius that may play others than the ego."""
+def _label_objects_in_reach(label: Label, ego: int, options: MatchOptions) -> list[tuple[int, str]]:
+    """Numbers and classes of the label objects that may play other roles than the ego: all within `--radius` of it."""
     label_objects = (label.ego, *label.objects)
     first = 1 if options.ego == "label" or not label.has_ego else 0
     numbers = [number for number in range(first, len(label_objects)) if number != ego]
@@ -201,9 +229,9 @@ def _free(label: Label, ego: int, options: MatchOptions) -> list[tuple[int, str]
     return [(number, label_objects[number].category) for number in numbers]
 
 
-def _short(candidates: Mapping[int, tuple[int, ...]]) -> int | None:
-    """An object for which there is no label object left, if there is one."""
-    slots = [Slot(index, options) for index, options in candidates.items()]
+def _find_unfilled_role(candidates: Mapping[int, tuple[int, ...]]) -> int | None:
+    """A role that no label object is left for, when each plays one role at most; None if all can be filled."""
+    slots = [Slot(index, numbers) for index, numbers in candidates.items()]
     empty = next((slot.name for slot in slots if not slot.candidates), None)
     if empty is None and matchable(slots) is None:
         return min(candidates, key=lambda index: len(candidates[index]))

@@ -36,7 +36,7 @@ __all__ = [
     "Item",
     "LabelNodes",
     "condition_group",
-    "conditioned",
+    "condition_items",
     "fact",
     "item_conjuncts",
     "options_of",
@@ -125,7 +125,7 @@ def _readers(group: Group) -> tuple[tuple[Node, tuple[int, ...]], ...]:
     return tuple((node, tuple(sorted(read[id(node)]))) for node in nodes if read[id(node)])
 
 
-def conditioned(
+def condition_items(
     items: Sequence[Item], given: Mapping[Identity, Value] | None = None, *, memo: dict[int, Node] | None = None
 ) -> list[Item]:
     """Items with more that is known; what they share stays shared.

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 from scenicq.forest import build
 from scenicq.forest.among import asks_others
-from scenicq.forest.collisions import apart, boxes
+from scenicq.forest.collisions import boxes, no_overlap
 from scenicq.forest.condition import expand
 from scenicq.forest.groups import PARAMS, Comparison, Condition, Constraint, Group, group_constraints
 from scenicq.forest.nodes import COURSE, GOING, LAST_LANE, WHO, Among, Feature, Node
@@ -64,7 +64,7 @@ def _definition(scenario: Scenario, signature: Signature, feature: Feature, *, n
     return owner.properties[feature.property].value
 
 
-def compared(owner: ScenarioObject, seen: frozenset[str]) -> list[str]:
+def compared_properties(owner: ScenarioObject, seen: frozenset[str]) -> list[str]:
     """The properties of an object that are compared with the label, in the order in which they are checked."""
     always = [name for name in _ALWAYS if name in seen and name not in owner.mutated]
     others = sorted(
@@ -95,7 +95,7 @@ def build_groups(scenario: Scenario, signature: Signature, options: MatchOptions
         if given.explicit:
             found.append(Comparison(PARAMS, name, observed(given.value), given.span))
     for owner in scenario.objects:
-        for name in compared(owner, signature[owner.index]):
+        for name in compared_properties(owner, signature[owner.index]):
             given = owner.properties[name]
             found.append(Comparison(owner.index, name, observed(given.value), given.span))
     for requirement in scenario.requirements:
@@ -106,7 +106,7 @@ def build_groups(scenario: Scenario, signature: Signature, options: MatchOptions
     if BuiltIn.COLLISION in options.enforce:
         frames = boxes(scenario)
         for first, second in itertools.combinations(scenario.solid, 2):
-            requirement = apart(scenario, frames, first, second)
+            requirement = no_overlap(scenario, frames, first, second)
             found.append(Condition(requirement, after_noise(requirement.condition)))
 
     def unobserved(feature: Feature | Among) -> bool:

@@ -14,7 +14,7 @@ from scenicq.forest.nodes import Constant, DirectionAt, Identity, Index, Leaf, N
 from scenicq.forest.walk import children, is_leaf, leaves, postorder
 from scenicq.geometry.angles import distance
 from scenicq.limits import LIMITS
-from scenicq.match.problem.conditioned import Item, conditioned
+from scenicq.match.problem.conditioned import Item, condition_items
 from scenicq.match.tolerance import ROUNDING, Tolerance
 
 __all__ = ["ground_cause", "holds", "replay", "show_value", "unlike"]
@@ -41,7 +41,7 @@ def show_value(property_: str, value: Value) -> str:
 
 
 def unlike(property_: str, value: Value, observed: Value) -> str:
-    """That a label's value is not the one that the scenario gives, in a person's units."""
+    """Say that a label's value is not the one that the scenario gives, in units that people read."""
     return f"is {show_value(property_, observed)}, not {show_value(property_, value)}"
 
 
@@ -67,7 +67,7 @@ def replay(
     if any(leaf.identity not in assignment for leaf in asked):
         # what is not picked needs no value
         picked = [leaf.identity for leaf in asked if isinstance(leaf, Index) and leaf.identity in assignment]
-        items = conditioned(items, {identity: assignment[identity] for identity in picked})
+        items = condition_items(items, {identity: assignment[identity] for identity in picked})
     if headings is not None:
 
         def nearest(node: DirectionAt, allowed: tuple[float, ...]) -> float:

@@ -1,4 +1,4 @@
-"""The label objects of labels as the elements that conditions on others go through, and who of them plays a role."""
+"""The label objects that conditions on other label objects go through, and which of them play a role."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from scenicq.match.problem.candidates import LabelProblem
 from scenicq.store.classes import Granularity, class_truth
 from scenicq.store.labels import Label, LabelObject
 
-__all__ = ["elements_of", "who_plays"]
+__all__ = ["elements_of", "observe_roles"]
 
 _WHO = (IDENTITY, TRACK)
 
 
-def who_plays(problem: LabelProblem, assignment: Mapping[int, int]) -> dict[tuple[int, str], Value]:
-    """All label objects of a label, and which of them play the scenario's objects, as what is observed of it.
+def observe_roles(problem: LabelProblem, assignment: Mapping[int, int]) -> dict[tuple[int, str], Value]:
+    """Observe all label objects of a label, and which of them play the scenario's objects.
 
     Args:
         problem: The label.

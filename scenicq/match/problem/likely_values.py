@@ -1,7 +1,7 @@
 """A group over the likely values of its normal variables alone, where these are unbounded: enough for most witnesses.
 
 A normal variable may be anything, which bounds nothing; nearly always it is within some standard deviations of its
-mean, which bounds what hangs on it, and which choices may come out. What matches so matches; what does not may still.
+mean, which bounds what depends on it, and which choices may come out. What matches so matches; what does not may still.
 """
 
 from __future__ import annotations

@@ -9,10 +9,10 @@ from scenicq.forest.scenario import Scenario
 from scenicq.forest.simplify import simplify
 from scenicq.forest.step_counts import choose_steps
 
-__all__ = ["ready"]
+__all__ = ["prepare_scenario"]
 
 
-def ready(scenario: Scenario) -> Scenario:
+def prepare_scenario(scenario: Scenario) -> Scenario:
     """The scenario rewritten to be matched; scenes are still drawn from it as it was written.
 
     Args:
@@ -21,4 +21,4 @@ def ready(scenario: Scenario) -> Scenario:
     if scenario.as_written is not None:
         return scenario
     made = simplify(choose_elements(choose_steps(scenario)))
-    return replace(made, as_written=scenario, variants=tuple(map(ready, scenario.variants)))
+    return replace(made, as_written=scenario, variants=tuple(map(prepare_scenario, scenario.variants)))

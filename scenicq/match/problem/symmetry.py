@@ -46,7 +46,7 @@ from scenicq.forest.value_numbers import ValueNumbers, parts_of
 from scenicq.forest.walk import children, features, is_leaf, leaves, postorder
 from scenicq.match.tolerance import Tolerance
 
-__all__ = ["GroupShape", "classes_of_twins", "in_one_order", "interchangeable", "shape_of"]
+__all__ = ["GroupShape", "classes_of_twins", "interchangeable", "shape_of", "sort_interchangeable"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,7 +129,7 @@ def interchangeable(
     Args:
         scenario: The scenario.
         groups: What is asked of a label.
-        shapes: Of the groups.
+        shapes: Shapes of the groups.
         tolerance: Per feature.
         used: For each object the properties that matter, where what the program says of them must be alike, too.
     """
@@ -167,8 +167,8 @@ def classes_of_twins(twins: Mapping[int, int]) -> list[list[int]]:
     return list(found.values())
 
 
-def in_one_order(assignment: Mapping[int, int], twins: Mapping[int, int]) -> frozenset[tuple[int, int]]:
-    """Who plays whom, interchangeable objects in ascending order.
+def sort_interchangeable(assignment: Mapping[int, int], twins: Mapping[int, int]) -> frozenset[tuple[int, int]]:
+    """An assignment in which interchangeable objects have label objects in ascending order.
 
     Args:
         assignment: The number of the label object of each object.

@@ -1,1 +1,1 @@
-"""Who plays which role: pruning of candidates and search of a correspondence."""
+"""Search for a correspondence: which label object plays which role, after candidates are pruned."""

@@ -26,9 +26,9 @@ from scenicq.forest.nodes import (
     Node,
     Value,
 )
-from scenicq.limits import LIMITS, exhausted
+from scenicq.limits import LIMITS, limit_exceeded
 from scenicq.match.problem.bipartite_matching import Slot
-from scenicq.match.problem.conditioned import Item, conditioned, fact, item_conjuncts, uses_far_field
+from scenicq.match.problem.conditioned import Item, condition_items, fact, item_conjuncts, uses_far_field
 from scenicq.match.problem.evaluation import ground_cause, holds
 from scenicq.match.problem.outcome import Outcome, Patience, Refuted, Satisfied, Search, SearchSteps, Undecided
 from scenicq.match.search.backtracking import Consistency, find_assignments
@@ -76,7 +76,7 @@ def search_choices(
     if not any(part.trees for part in found):
         return None
     if depth > LIMITS.choice_nesting:
-        return Undecided.by(items[0][0], exhausted("choice_nesting"))
+        return Undecided.by(items[0][0], limit_exceeded("choice_nesting"))
     for part in found:
         if any(not tree.results for tree in part.trees.values()):
             return Refuted(part.item[0])
@@ -196,7 +196,7 @@ class _ChoiceSearch:
         return None
 
     def _about(self, slot: int) -> Constraint:
-        """A constraint that hangs on a slot."""
+        """A constraint that depends on a slot."""
         return next((part.item[0] for part in self.parts if slot in part.slots), self.items[0][0])
 
     # --- the search
@@ -213,7 +213,7 @@ class _ChoiceSearch:
             for slot in group:
                 links.setdefault(slot, set()).update(group - {slot})
         return find_assignments(
-            slots, self._check, links=links, budget=LIMITS.choice_tries, spent=exhausted("choice_tries")
+            slots, self._check, links=links, budget=LIMITS.choice_tries, spent=limit_exceeded("choice_tries")
         )
 
     def _check(self, slot: int, assignment: Mapping[int, int]) -> tuple[Consistency, frozenset[int]]:
@@ -241,7 +241,7 @@ class _ChoiceSearch:
                     self.doubt = self.doubt or outcome
                     answer = Consistency.NO
                 continue
-            # what already hangs on nothing open may be unsatisfiable together
+            # what already depends on nothing open may be unsatisfiable together
             ready = [part for part in component.parts if part.slots <= assigned]
             if len(ready) > 1 and any(slot in part.slots for part in ready):
                 slots = frozenset(each for part in ready for each in part.slots)
@@ -298,11 +298,11 @@ class _ChoiceSearch:
         given, taken = self._given(slots, assignment)
         asked = {id(lookup) for lookup in lookups}
         memo: dict[int, Node] = {id(node): Constant(float(pick), span=node.span) for node, pick in taken}
-        left = conditioned([part.item for part in parts], given, memo=dict(memo))
+        left = condition_items([part.item for part in parts], given, memo=dict(memo))
         for node, pick in taken:
             if id(node) in asked:
                 inner = {key: value for key, value in memo.items() if key != id(node)}
-                (placed,) = conditioned([fact(_is(node, pick))], given, memo=inner)
+                (placed,) = condition_items([fact(_is(node, pick))], given, memo=inner)
                 left.append(placed)
         for constraint, node, seen in left:
             if isinstance(node, Constant) and not holds(constraint, node.value, seen, self.tolerance):
@@ -344,7 +344,7 @@ class _ChoiceSearch:
 
 
 def _is(index: Node, pick: int) -> Node:
-    """That an expression takes an option."""
+    """The condition that an index takes an option."""
     if kind_of(index) == "boolean":
         return index if pick else build.opposite(index)
     return build.compare(CompareOp.EQ, index, Constant(float(pick), span=index.span), index.span)

@@ -27,7 +27,7 @@ from scenicq.forest.scenario import Scenario
 from scenicq.limits import LIMITS
 from scenicq.match.decide.closed_form import ClosedForm, Evaluated
 from scenicq.match.decide.others_forms import others_form_of
-from scenicq.match.decide.range_forms import Columns, FloatColumn, Get
+from scenicq.match.decide.range_forms import Columns, FloatColumn, Lookup
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import Candidates
 from scenicq.match.problem.constraints import Signature
@@ -86,9 +86,9 @@ class FilledBatch:
 
     Attributes:
         rows: The labels.
-        numbers: Of each, who plays the objects of `FirstFit.order`.
+        numbers: Numbers of the label objects that play `FirstFit.order`, for each label.
         variables: The random variables that have a value, group by group.
-        witnesses: Of each label, their values.
+        witnesses: Values of the variables, for each label.
     """
 
     rows: Sequence[LabelRow]
@@ -103,7 +103,7 @@ class FailedBatch:
 
     Attributes:
         rows: The labels.
-        numbers: Of each, who plays the objects of `FirstFit.order` in the correspondence that comes furthest.
+        numbers: As in `FilledBatch`, for the correspondence that comes furthest.
         constraint: What fails of that.
         form: The closed form of the group of which it is one.
     """
@@ -203,7 +203,7 @@ class _Batch:
     Attributes:
         fit: The plan.
         rows: The labels.
-        numbers: Of each, who plays the first objects of the order.
+        numbers: Numbers of the label objects that play the first objects of the order, for each label.
         values: By group, the values of its random variables: a column each, or what all labels have.
         decisions: How many groups were decided for these labels.
         columns: What is observed of the label objects in the roles.
@@ -329,12 +329,12 @@ class _Batch:
         witnesses = list(zip(*columns, strict=True)) if columns else [()] * size
         return FilledBatch(self.rows, self.numbers, tuple(variables), witnesses)
 
-    def get(self, number: int) -> Get:
+    def get(self, number: int) -> Lookup:
         """The observed values of one label."""
         return _getter(self.rows[number], self.numbers[number], self.fit.ranks)
 
 
-def _getter(row: LabelRow, numbers: tuple[int, ...], ranks: Mapping[int, int]) -> Get:
+def _getter(row: LabelRow, numbers: tuple[int, ...], ranks: Mapping[int, int]) -> Lookup:
     """The observed values of one label."""
     known = row.seen
 
@@ -367,7 +367,7 @@ def _column(
     Args:
         ranks: Where in the order of roles each object is.
         rows: The labels.
-        numbers: Of each, who plays the first objects of that order.
+        numbers: Numbers of the label objects that play the first objects of that order, for each label.
         index: The object.
         name: The property.
     """
@@ -394,7 +394,7 @@ def _column(
 
 
 def _who(rows: Sequence[LabelRow], playing: Sequence[int], name: str) -> FloatColumn:
-    """Who plays an object, as a number; or the place of its id in its label."""
+    """The number of the label object that plays a role, or the place of its id in its label."""
     if name != RANK:
         return np.array(playing, dtype=np.float64)
     return np.array([
@@ -419,7 +419,7 @@ def _label_object(label: Label, number: int) -> LabelObject:
 
 
 def _following(order: Sequence[int], candidates: Candidates, numbers: tuple[int, ...]) -> tuple[int, ...]:
-    """Who plays the first objects of an order next, after some have; nobody, if all has been tried."""
+    """The next numbers to try for the first roles of an order; () if all have been tried."""
     for length in range(len(numbers) - 1, 0, -1):
         options, taken = candidates[order[length]], numbers[:length]
         for one in options[options.index(numbers[length]) + 1 :]:
@@ -429,7 +429,7 @@ def _following(order: Sequence[int], candidates: Candidates, numbers: tuple[int,
 
 
 def _with_first_free(taken: tuple[int, ...], options: Sequence[int]) -> tuple[int, ...]:
-    """Those who play objects and the first of some who does not; nobody, if all of them do."""
+    """The numbers taken so far and the first option that is free; () if none is."""
     for one in options:
         if one not in taken:
             return (*taken, one)
@@ -444,7 +444,7 @@ def _kept(values: Values, mask: NDArray[np.bool_], kept: Sequence[bool]) -> Floa
 
 
 def _alike(values: list[T]) -> T | list[T]:
-    """The same, as one value where all have it."""
+    """One value if all are equal, else the list."""
     return values[0] if values.count(values[0]) == len(values) else values
 
 
@@ -505,7 +505,7 @@ def _with_course(names: frozenset[str]) -> frozenset[str]:
 
 @functools.lru_cache(maxsize=4096)
 def _among(names: frozenset[str], relevant: tuple[frozenset[str], ...]) -> frozenset[str]:
-    """Those that matter of some object of the scenario."""
+    """The names that are relevant for some object of the scenario."""
     return names & frozenset[str]().union(*relevant)
 
 

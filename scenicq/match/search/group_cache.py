@@ -23,7 +23,7 @@ from scenicq.match.decide.solver_step import AskSolver
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import LabelProblem
 from scenicq.match.problem.conditioned import Item, LabelNodes, uses_field
-from scenicq.match.problem.label_elements import who_plays
+from scenicq.match.problem.label_elements import observe_roles
 from scenicq.match.problem.likely_values import likely_group
 from scenicq.match.problem.map_lookups import MapLookups
 from scenicq.match.problem.outcome import (
@@ -43,7 +43,7 @@ from scenicq.match.search.group_plan import GroupPlan
 if TYPE_CHECKING:  # takes long to load
     from scenicq.match.fields.heading_propagation import DirectedCases, KnownCases
 
-__all__ = ["POSTPONED", "GroupCache", "known_of", "surely", "translated"]
+__all__ = ["POSTPONED", "GroupCache", "certain_group", "possible_outcome", "rename_variables"]
 
 POSTPONED = "postponed"
 """The reason of what is undecided for want of patience alone."""
@@ -79,13 +79,13 @@ class GroupCache:
         """Whether a question takes more patience."""
         return not all(search.is_finished for _, search in self._known.values())
 
-    def items(self, group: Group, assignment: Mapping[int, int], *, surely: bool = False) -> list[Item]:
+    def items(self, group: Group, assignment: Mapping[int, int], *, certain: bool = False) -> list[Item]:
         """The constraints of a group given the label (algorithm 1, line 11).
 
         Args:
             group: The group.
-            assignment: Who plays whom.
-            surely: What is not known of label objects without a role is taken for what breaks a constraint; else for
+            assignment: The label object of each role.
+            certain: What is not known of label objects without a role is taken for what breaks a constraint; else for
                 what fulfils it.
 
         Raises:
@@ -93,7 +93,7 @@ class GroupCache:
         """
         items = self._conditioned(group, assignment)
         if _asks_others(group):
-            items = [(item, certain_and_possible(node, _is_among)[not surely], seen) for item, node, seen in items]
+            items = [(item, certain_and_possible(node, _is_among)[not certain], seen) for item, node, seen in items]
         return items if self.problem.disc is None else within_radius(items, *self.problem.disc)
 
     def has_doubts(self, group: Group, assignment: Mapping[int, int]) -> bool:
@@ -114,14 +114,17 @@ class GroupCache:
         observed.update({(PARAMS, name): value for name, value in self.problem.params.items()})
         if not asks:
             return self._nodes.items(group, observed, assignment)
-        observed.update(who_plays(self.problem, assignment))
+        observed.update(observe_roles(self.problem, assignment))
         items = self._nodes.items(group, observed, assignment)
         # those are asked for twice
         self._last = key, items
         return items
 
     def of(self, plan: GroupPlan, assignment: Mapping[int, int]) -> tuple[Group, Outcome]:
-        """What is decided for the label objects in a group's roles, said of a group of its shape (see `translated`)."""
+        """What is decided for the label objects in a group's roles: the group of its shape, and the outcome for that.
+
+        `rename_variables` makes it the outcome of the group.
+        """
         key = (plan.kind, tuple([assignment[index] for index in plan.roles]))
         known = self._known.get(key)
         if known is None:
@@ -136,8 +139,8 @@ class GroupCache:
         outcome = self._in_closed_form(plan, assignment) or (yield from self._by_cascade(group, assignment))
         if not isinstance(outcome, Satisfied) or not (group.doubtful or self.has_doubts(group, assignment)):
             return outcome
-        sure = surely(group) if group.doubtful else group
-        return known_of(group, (yield from self._by_cascade(sure, assignment, surely=True)))
+        sure = certain_group(group) if group.doubtful else group
+        return possible_outcome(group, (yield from self._by_cascade(sure, assignment, certain=True)))
 
     def _in_closed_form(self, plan: GroupPlan, assignment: Mapping[int, int]) -> Outcome | None:
         """What a closed form says, if it is clear."""
@@ -146,18 +149,18 @@ class GroupCache:
         seen = self.problem.seen
         return plan.closed_form.decide(lambda index, name: seen[assignment[index]][name], self.options, self.lookups)
 
-    def _by_cascade(self, group: Group, assignment: Mapping[int, int], *, surely: bool = False) -> SearchSteps:
+    def _by_cascade(self, group: Group, assignment: Mapping[int, int], *, certain: bool = False) -> SearchSteps:
         try:
             look()
             if self.options.method == "smt":
-                return self.ask([self.items(group, assignment, surely=surely)])
+                return self.ask([self.items(group, assignment, certain=certain)])
             likely = likely_group(group)
             if likely is not None:
-                found = yield from self._decided(self.items(likely.group, assignment, surely=surely), self._searched)
+                found = yield from self._decided(self.items(likely.group, assignment, certain=certain), self._searched)
                 if isinstance(found, Satisfied):
                     return likely.restored(found)
                 yield Patience.ALL
-            return (yield from self._decided(self.items(group, assignment, surely=surely), self._at_last))
+            return (yield from self._decided(self.items(group, assignment, certain=certain), self._at_last))
         except CannotEvaluate as error:
             return Undecided(group.constraints[0], f"unsupported: {error}")
         except Exhausted as error:
@@ -192,7 +195,7 @@ class GroupCache:
         return self.ask(items, found) if isinstance(found, Undecided) else found
 
 
-def translated(decided: tuple[Group, Outcome], target: Group) -> Outcome:
+def rename_variables(decided: tuple[Group, Outcome], target: Group) -> Outcome:
     """What was decided for a group, said of another one of the same shape."""
     source, outcome = decided
     if source is target:
@@ -209,13 +212,13 @@ def translated(decided: tuple[Group, Outcome], target: Group) -> Outcome:
     )
 
 
-def surely(group: Group) -> Group:
-    """The group that only those satisfy who satisfy it whatever is not observed."""
+def certain_group(group: Group) -> Group:
+    """The group that label objects satisfy only if they do for every value of what is not observed."""
     return replace(group, constraints=group.certain, doubtful=(), certain=())
 
 
-def known_of(group: Group, sure: Outcome) -> Outcome:
-    """The outcome of a group that may be satisfied, from that of `surely` of it."""
+def possible_outcome(group: Group, sure: Outcome) -> Outcome:
+    """The outcome of a group that may be satisfied, from that of `certain_group` of it."""
     if not isinstance(sure, Refuted):
         return sure
     return Undecided(group.doubtful[0] if group.doubtful else sure.constraint, UNOBSERVED)

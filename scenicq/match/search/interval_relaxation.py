@@ -50,7 +50,7 @@ class Relaxation:
         given: dict[int, IntervalValue[FloatOrArray]] = {}
         for step in steps_of(*roots):
             node, below = step
-            # the bounds of all options do not hang on which of them is meant
+            # the bounds of all options do not depend on which of them is meant
             needed = below[1:] if isinstance(node, Select) else below
             if not isinstance(node, Feature) and all(id(each) in given for each in needed):
                 known = {id(each): given.get(id(each)) for each in below}

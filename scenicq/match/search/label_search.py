@@ -26,10 +26,10 @@ from scenicq.match.problem.conditioned import Item
 from scenicq.match.problem.constraints import Signature
 from scenicq.match.problem.map_lookups import MapLookups
 from scenicq.match.problem.outcome import Outcome, Patience, Refuted, Satisfied, Search, Undecided
-from scenicq.match.problem.symmetry import in_one_order
+from scenicq.match.problem.symmetry import sort_interchangeable
 from scenicq.match.search.arc_consistency import arc_consistent
 from scenicq.match.search.backtracking import Consistency, Reporter, find_assignments
-from scenicq.match.search.group_cache import POSTPONED, GroupCache, known_of, surely, translated
+from scenicq.match.search.group_cache import POSTPONED, GroupCache, certain_group, possible_outcome, rename_variables
 from scenicq.match.search.group_plan import GroupPlan, MatchPlan
 
 __all__ = ["Failure", "LabelSearch", "Solution"]
@@ -159,7 +159,7 @@ class LabelSearch:
         self, plan_of: Callable[[Signature], MatchPlan], signature: Signature,
         candidates: Mapping[int, tuple[int, ...]], twins: Mapping[int, int],
     ) -> _Found:  # fmt: skip
-        """Those of one signature, some of them perhaps more than once; see `solutions`."""
+        """The solutions of one signature, some perhaps more than once; see `solutions`."""
         plan = plan_of(signature)
         monolithic = self.options.method == "monolithic"
         judged: _Judged | None = None
@@ -195,7 +195,7 @@ class LabelSearch:
     def _is_new(self, assignment: Mapping[int, int], twins: Mapping[int, int]) -> bool:
         """Whether a correspondence is told for the first time, in whatever order interchangeable objects are."""
         # objects of which a label tells more or less come in another order in another signature
-        order = in_one_order(assignment, twins)
+        order = sort_interchangeable(assignment, twins)
         if order in self._orders:
             return False
         self._orders.add(order)
@@ -213,7 +213,7 @@ class LabelSearch:
 
     def decide(self, plan: GroupPlan, assignment: Mapping[int, int]) -> Outcome:
         """Decide a group for the label objects in its roles, or remember what was decided for them."""
-        return translated(self._decisions.of(plan, assignment), plan.group)
+        return rename_variables(self._decisions.of(plan, assignment), plan.group)
 
     def _judge(self, plan: GroupPlan, assignment: Mapping[int, int], depth: int) -> Consistency:
         """Decide a group, and remember what failed furthest."""
@@ -225,7 +225,7 @@ class LabelSearch:
             return Consistency.UNKNOWN
         if self.failure is None or depth > self.failure.depth:
             self.failure = Failure(
-                depth, plan.group, cast("Refuted", translated(decided, plan.group)), dict(assignment)
+                depth, plan.group, cast("Refuted", rename_variables(decided, plan.group)), dict(assignment)
             )
         return Consistency.NO
 
@@ -367,7 +367,7 @@ class LabelSearch:
         Args:
             plan: The groups.
             slots: The objects with their candidates.
-            ego: Who plays the ego.
+            ego: Number of the label object that plays the ego.
             twins: For an object, an earlier one that is interchangeable with it.
             accept_unknown: Whether groups may be undecided.
             budget: Steps; what the options say if not given.
@@ -459,9 +459,9 @@ class LabelSearch:
             groups = [each.group for each in plan.groups]
             doubtful = [group for group in groups if group.doubtful or self._decisions.has_doubts(group, assignment)]
             if doubtful and isinstance(outcome, Satisfied):
-                sure = [surely(group) if group.doubtful else group for group in groups]
-                items = [self._decisions.items(group, assignment, surely=True) for group in sure]
-                outcome = known_of(doubtful[0], self.ask(items))
+                sure = [certain_group(group) if group.doubtful else group for group in groups]
+                items = [self._decisions.items(group, assignment, certain=True) for group in sure]
+                outcome = possible_outcome(doubtful[0], self.ask(items))
             return outcome
         except CannotEvaluate as error:
             return Undecided(plan.groups[0].group.constraints[0], f"unsupported: {error}")

@@ -26,7 +26,7 @@ from scenicq.forest.walk import children, leaves, postorder
 from scenicq.geometry.fields import VectorField
 from scenicq.geometry.membership import bounds as region_bounds
 from scenicq.geometry.regions import Region
-from scenicq.limits import LIMITS, exhausted
+from scenicq.limits import LIMITS, limit_exceeded
 from scenicq.match.tolerance import SLACK
 
 __all__ = ["ChoiceTree", "ChoiceVariable", "Outcomes", "above_choices", "tree_of"]
@@ -148,7 +148,7 @@ def tree_of(root: Select) -> ChoiceTree:
             rows.append(path)
             results.append(node)
             if len(rows) > LIMITS.nested_outcomes:
-                raise exhausted("nested_outcomes")
+                raise limit_exceeded("nested_outcomes")
             for variable in path:
                 columns.setdefault(variable, len(columns))
             continue

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 from scenicq.forest.scenario import Scenario
 from scenicq.match.options import MatchOptions
-from scenicq.match.problem.candidates import Candidates, candidates_of, nearest_first
+from scenicq.match.problem.candidates import Candidates, candidates_of, sort_by_distance
 from scenicq.match.problem.constraints import Signature, build_groups, relevant_properties
 from scenicq.match.problem.observation import course_rules
 from scenicq.match.problem.symmetry import interchangeable, shape_of
@@ -78,29 +78,29 @@ class PlanCache:
         return {**self.always_twins, **here}
 
     def first_fits(
-        self, labels: Iterable[tuple[Label, Candidates | None]], given: Mapping[str, str]
+        self, labels: Iterable[tuple[Label, Candidates | None]], fixed_roles: Mapping[str, str]
     ) -> dict[FirstFit, list[LabelRow]]:
         """The labels that first fit can decide, by their plans.
 
         Args:
-            labels: Labels, each with what is known of who may play whom.
-            given: Ids of label objects that are known to play objects, by the objects' names.
+            labels: Labels, each with the candidates of its roles, where they are known already.
+            fixed_roles: Ids of the label objects that play certain roles, by the names of the roles.
         """
         options = self.options
         courses = next(iter(course_rules(self.scenario).values()), None)
         found: dict[FirstFit, list[LabelRow]] = {}
         if options.method != "auto" or options.exact or options.ego != "label":
             return found
-        for number, (label, among) in enumerate(labels):
+        for number, (label, known) in enumerate(labels):
             if label.has_ego:
-                roles = among
-                if roles is None or given:
-                    roles = candidates_of(self.scenario, label, 0, options, given, among)
+                roles = known
+                if roles is None or fixed_roles:
+                    roles = candidates_of(self.scenario, label, 0, options, fixed_roles, known)
                 signature = signature_of(label, self.scenario.ego, roles, self.relevant)
                 fit = None if signature is None else self._first_fit(self.plan(signature))
                 if fit is not None:
                     found.setdefault(fit, []).append(
-                        LabelRow(number, label, nearest_first(label, 0, roles), {}, courses)
+                        LabelRow(number, label, sort_by_distance(label, 0, roles), {}, courses)
                     )
         return found
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from scenicq.limits import LIMITS
 from scenicq.match.verdict import Cause, Unknown
-from scenicq.processes import Lost, Work, Workers, as_many_as_pay
+from scenicq.processes import Lost, Work, Workers, default_processes
 from scenicq.query.execution.block_matcher import Decided, Decider, every_label
 from scenicq.query.execution.results import Result
 from scenicq.query.prefilter.executor import Block, join_first
@@ -24,7 +24,7 @@ _PAYS_S = 3.0
 
 
 class BlockExecutor:
-    """Decides blocks, in order whoever does it; a context manager.
+    """Decides blocks here or in workers, and yields them in order; a context manager.
 
     A process that dies costs nothing but its block's time. Where a block kills every process which takes it,
     halving finds the frames that do so, and they are unknown.
@@ -43,7 +43,7 @@ class BlockExecutor:
             start: Makes what decides in another; see `Workers`.
             setup: Its arguments.
         """
-        self.jobs = as_many_as_pay() if jobs is None else jobs
+        self.jobs = default_processes() if jobs is None else jobs
         self._asked = jobs is not None
         self._dataset, self._decider = dataset, decider
         self._workers: Workers[Block, Decided] = Workers(self.jobs, start, setup)

@@ -90,7 +90,7 @@ class CompiledMap:
         return cls(scenario, network, plan, motion, observed, whole, not network.is_read)
 
     def over(self, scenario: Scenario, network: Network) -> CompiledMap:
-        """The same over another map of the same traits, given the scenario over that map."""
+        """Make the compiled map of another map with the same traits, from the scenario over that map."""
         variants = tuple(replace(each, map=network.name) for each in scenario.variants)
         named = replace(scenario, map=network.name, variants=variants)
         return replace(self, scenario=named, network=network, plan=replace(self.plan, map=network.name))
@@ -104,7 +104,7 @@ class Decided:
         missed: For each frame in order the number of the plan's step that excludes it, -1 for candidates.
         found: For each candidate in order its results, at least one.
         names: Frame, recording and timestamp of every frame, if asked for.
-        recordings: Of a query over time, what became of the recordings; then nothing is found of single candidates.
+        recordings: What became of the recordings, for a query over time; then nothing is found of single candidates.
     """
 
     missed: NDArray[np.int16]
@@ -119,11 +119,11 @@ class Decider:
 
     Attributes:
         dataset: The dataset.
-        options: Of the matcher.
+        options: Options of the matcher.
         solver: By name.
         plan_map: Gives the program over a map, or over one that differs in nothing that the prefilter asks for.
         compile_map: Gives the program over a map; what is not asked for again soon is not kept.
-        threads: Of the database.
+        threads: Threads of the database.
         all_matches: Whether every correspondence is a result.
         every: Whether the names of excluded frames are wanted.
         proofs: Whether somebody reads the values that prove matches over time.
@@ -337,7 +337,7 @@ class Decider:
     def _players(
         self, plan: Plan, block: Block, frames: NDArray[np.int64]
     ) -> tuple[NDArray[np.int16], Mapping[str, NDArray[Any]]]:
-        """Which of the frames of a block a plan without stages excludes, and who may play which role in the others."""
+        """Which frames of a block a plan without stages excludes, and the candidates of each role in the others."""
         found = run_players(self.dataset, self.connection, plan, block)
         place = np.searchsorted(frames, found["f"])
         roles = [
@@ -425,7 +425,7 @@ def _result(label: Label, verdict: Verdict, own_lanes: OwnLanes | None) -> Resul
 
 def _every_match(matcher: Matcher, label: Label, among: Candidates | None) -> list[Verdict]:
     """Every correspondence by which a label matches and whether there may be more, or else why none does."""
-    return [finding.verdict for finding in matcher.findings(label, among=among)]
+    return [finding.verdict for finding in matcher.findings(label, candidates=among)]
 
 
 def every_label(dataset: Dataset, block: Block, *, motion: bool = False) -> Iterator[Label]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from typing import Any
 
-from scenicq.errors import CONTROL, plain
+from scenicq.errors import CONTROL, printable
 
 __all__ = ["SPREADSHEET_MARK", "quote_cell", "unquote_cell"]
 
@@ -31,7 +31,7 @@ def quote_cell(value: Any, *, spreadsheet: bool) -> Any:
         return value
     if not value.startswith((*_FORMULA, "'") if spreadsheet else "'") and not CONTROL.search(value):
         return value
-    return "'" + plain(value.replace("\\", "\\\\"))
+    return "'" + printable(value.replace("\\", "\\\\"))
 
 
 def unquote_cell(cell: str) -> str:

@@ -32,7 +32,7 @@ from scenicq.budget import time_left_s
 from scenicq.errors import DataError, Diagnostic
 from scenicq.limits import LIMITS
 from scenicq.processes import processors
-from scenicq.query.execution.executors import Done, Executor, Progress, Question, alone, run_piece
+from scenicq.query.execution.executors import Done, Executor, Progress, Question, run_frame_by_frame, run_piece
 from scenicq.query.execution.pieces import DatasetPiece
 from scenicq.query.execution.run import Query
 from scenicq.store.read_lock import Reading, nobody_reads
@@ -43,7 +43,6 @@ _LOOPBACK = "127.0.0.1"
 _SCRATCH = "scenicq-dask-"
 _BEGINS_S = 60
 """Seconds after which a folder that nobody uses is one that is left."""
-
 
 _LATER = ("`--resume` with `-o FILE` goes on where a query stopped",)
 
@@ -67,7 +66,7 @@ def dask(address: str | None = None, patience: DaskPatience | None = None) -> Ex
     """An executor that runs pieces on Dask.
 
     Args:
-        address: Of a scheduler, such as `tcp://host:8786`, whose workers have this version of scenicq and see the
+        address: Address of a scheduler (`tcp://host:8786`) whose workers have this version of scenicq and see the
             dataset under the same path. By default workers are started on this machine for the time of the query, as
             many as the query's `jobs` or, if that is None, as there are processors.
         patience: How long to wait for it.
@@ -147,7 +146,7 @@ def _scratch() -> Generator[str]:
     from dask import config  # noqa: PLC0415 - optional
 
     with tempfile.TemporaryDirectory(prefix=_SCRATCH, ignore_cleanup_errors=True) as folder:
-        # ages by the clock of the file system alone: nothing here hangs on the time that the machine is set to
+        # ages by the clock of the file system alone: nothing here depends on the time that the machine is set to
         begun = Path(folder).stat().st_mtime
         for left in Path(tempfile.gettempdir()).glob(f"{_SCRATCH}*"):
             with contextlib.suppress(OSError):
@@ -193,7 +192,7 @@ def _run(
             try:
                 done = _taken(client, future, patience)
             except KilledWorker:
-                done = alone(query, piece)
+                done = run_frame_by_frame(query, piece)
             future.release()
             yield piece, done
     except (OSError, CancelledError) as error:

@@ -1,7 +1,8 @@
-"""Who runs the pieces of a query: `here`, `processes`, `dask` or `resumed`; results come in the order of the pieces.
+"""Executors run the pieces of a query: `run_here`, `processes`, `dask`, and `resumable`, which keeps what is done.
 
-An executor is a function of a query, its pieces and whoever shows progress. It gives each piece with its results and
-counts, in their order, and begins none when the time is over. A process that dies costs the time of its piece.
+An executor is a function of a query, its pieces and whatever shows progress. It yields each piece with its results and
+counts, in the order of the pieces, and begins none once the time is over. A process that dies costs the time of its
+piece.
 """
 
 from __future__ import annotations
@@ -11,12 +12,12 @@ from collections.abc import Callable, Generator, Iterable
 from dataclasses import dataclass, replace
 
 from scenicq.errors import Source
-from scenicq.processes import Lost, Workers, as_many_as_pay
+from scenicq.processes import Lost, Workers, default_processes
 from scenicq.query.execution.pieces import DatasetPiece, find_finished, gather, partitions, write_piece
 from scenicq.query.execution.program_files import SiblingFiles
 from scenicq.query.execution.question_notes import name_question
 from scenicq.query.execution.records import read_record, record
-from scenicq.query.execution.results import Funnel, Result, up_to
+from scenicq.query.execution.results import Funnel, Result, limit_matches
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.dataset import DatasetReference
 from scenicq.store.remote_path import AnyPath
@@ -27,12 +28,12 @@ __all__ = [
     "Executor",
     "Progress",
     "Question",
-    "alone",
-    "here",
-    "in_order",
-    "on_this_machine",
+    "local_executor",
+    "ordered_results",
     "processes",
-    "resumed",
+    "resumable",
+    "run_frame_by_frame",
+    "run_here",
     "run_piece",
     "usual_pieces",
 ]
@@ -50,7 +51,7 @@ class Question:
 
     Attributes:
         dataset: The dataset.
-        fingerprint: Of dataset, program and options.
+        fingerprint: Checksum of dataset, program and options.
         source: The program.
         files: What reads the files that it imports.
         options: The options.
@@ -105,7 +106,7 @@ def run_piece(query: Query, piece: DatasetPiece, progress: Progress | None = Non
     return list(query.results(progress)), query.funnel
 
 
-def here(query: Query, pieces: Iterable[DatasetPiece], progress: Progress) -> Generator[tuple[DatasetPiece, Done]]:
+def run_here(query: Query, pieces: Iterable[DatasetPiece], progress: Progress) -> Generator[tuple[DatasetPiece, Done]]:
     """Run pieces in this process."""
     own = replace(query, options=replace(query.options, jobs=1))
     for piece in pieces:
@@ -124,27 +125,27 @@ def processes(count: int) -> Executor:
         workers: Workers[Asked, Done] = Workers(count, _start)
         with workers:
             for (_, piece), answer in workers.run((question, piece) for piece in pieces):
-                done = alone(query, piece) if isinstance(answer, Lost) else answer
+                done = run_frame_by_frame(query, piece) if isinstance(answer, Lost) else answer
                 progress(piece.frames)
                 yield piece, done
 
     return run
 
 
-def on_this_machine(query: Query) -> Executor:
+def local_executor(query: Query) -> Executor:
     """The executor that runs pieces here, or in as many processes as the query's options say or as pay."""
     jobs = query.options.jobs
     if jobs is None:
-        jobs = min(as_many_as_pay(), query.dataset.manifest.total.frames // PIECE_FRAMES)
-    return processes(jobs) if jobs > 1 else here
+        jobs = min(default_processes(), query.dataset.manifest.total.frames // PIECE_FRAMES)
+    return processes(jobs) if jobs > 1 else run_here
 
 
-def alone(query: Query, piece: DatasetPiece) -> Done:
+def run_frame_by_frame(query: Query, piece: DatasetPiece) -> Done:
     """Run a piece that kills the processes which take it: only the frames that kill are unknown."""
     return run_piece(replace(query, options=replace(query.options, jobs=2)), piece)
 
 
-def resumed(folder: AnyPath, executor: Executor) -> Executor:
+def resumable(folder: AnyPath, executor: Executor) -> Executor:
     """An executor that keeps pieces in a folder, and takes from there what is done already.
 
     Args:
@@ -176,7 +177,9 @@ def resumed(folder: AnyPath, executor: Executor) -> Executor:
     return run
 
 
-def in_order(query: Query, executor: Executor, pieces: Iterable[DatasetPiece], progress: Progress) -> Generator[Result]:
+def ordered_results(
+    query: Query, executor: Executor, pieces: Iterable[DatasetPiece], progress: Progress
+) -> Generator[Result]:
     """The results of a query that an executor runs, as `Query.results` gives them.
 
     Args:
@@ -185,7 +188,7 @@ def in_order(query: Query, executor: Executor, pieces: Iterable[DatasetPiece], p
         pieces: All of them.
         progress: Called with the number of frames decided since the last call.
     """
-    return up_to(query.limit, _put_together(query, executor, pieces, progress), query.funnel)
+    return limit_matches(query.limit, _put_together(query, executor, pieces, progress), query.funnel)
 
 
 def _put_together(

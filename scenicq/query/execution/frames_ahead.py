@@ -21,10 +21,10 @@ _Verdicts = TypeVar("_Verdicts")
 
 
 class FramesAhead:
-    """Passes frames on to who shows progress, each once: when it is told ahead, else when its result is taken."""
+    """Counts each frame once for the progress: when a worker announces it, otherwise when its result arrives."""
 
     def __init__(self, progress: Callable[[int], None] | None) -> None:
-        """Take who shows it, if anybody: called with the number of frames decided since the last call."""
+        """Take the function that shows progress, if any; it gets the number of frames decided since its last call."""
         self._progress = progress
         self._told: dict[tuple[int, int], int] = {}
         self._ahead = 0
@@ -59,8 +59,8 @@ def telling(
     """The verdicts of a block's candidates as they come, telling now and then how far they are.
 
     Args:
-        found: Of each frame that the prefilter leaves.
-        missed: Of each frame of the block the step of the prefilter that excludes it, negative where none does.
+        found: What was found of each frame that the prefilter leaves.
+        missed: The step of the prefilter that excludes each frame of the block, negative where none does.
         block: First and last frame.
         tell: Takes it to whoever shows progress.
         every_s: Seconds between what it takes.

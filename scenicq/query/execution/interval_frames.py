@@ -38,7 +38,7 @@ def frames_of(dataset: Dataset, result: Result) -> Iterator[tuple[Label, dict[st
 
     Args:
         dataset: The dataset.
-        result: Of an interval.
+        result: A result that is an interval.
     """
     span = result.interval
     if span is None:

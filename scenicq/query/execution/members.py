@@ -20,7 +20,7 @@ __all__ = ["Members", "fill_by_recording"]
 def fill_by_recording(
     results: Iterable[Result], fill: Callable[[str, list[Result]], Iterable[Result]]
 ) -> Iterator[Result]:
-    """The same results, where those of each recording with a match are filled together.
+    """Fill in the results of each recording with a match together; other results stay as they are.
 
     Args:
         results: The results, those of one recording together.
@@ -51,7 +51,7 @@ class Members:
     @classmethod
     @contextmanager
     def of_recording(cls, dataset: Dataset, recording: str) -> Generator[Members]:
-        """Those of the labels of a recording, which are open meanwhile."""
+        """The members of a recording's labels, which are open in the block."""
         part, first, end = dataset.recorded.rows(recording)
         with TrackBlock(dataset, part, [(first, end)]) as block:
             yield cls(block)

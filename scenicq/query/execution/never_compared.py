@@ -104,8 +104,8 @@ def _settings(scenario: Scenario, options: MatchOptions) -> Iterator[_Setting]:
 def _only_read(scenario: Scenario, options: MatchOptions) -> Iterator[_Setting]:
     """What a scenario reads and labels alone tell: no default stands in where they do not."""
     frame, over_time = (
-        "read here: a frame that hangs on it is unknown",
-        "read here: an interval that hangs on it is unknown",
+        "read here: a frame that depends on it is unknown",
+        "read here: an interval that depends on it is unknown",
     )
     read = [(requirement.condition, requirement.span, frame) for requirement in scenario.requirements]
     read += [
@@ -261,7 +261,7 @@ def _table(each: _Setting) -> str:
 
 
 def _full_columns(dataset: Dataset, table: str, names: Collection[str | None]) -> Collection[str | None]:
-    """Those of some columns of a table in which no row lacks a value."""
+    """Which of some columns of a table have a value in every row."""
     full = set(names)
     for file in dataset.files(table):
         if not full:

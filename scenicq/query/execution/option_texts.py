@@ -111,11 +111,11 @@ class OptionTexts(TypedDict, total=False):
 
     run_scenario: Annotated[str | None, Option(
         Text("the name of a scenario"), "NAME",
-        "Which scenario of a program with several runs.  [default: Main, or the only one]",
+        "Which scenario runs, of a program with several.  [default: Main, or the only one]",
         _MATCH, ("--scenario",), "label")]
     params: Annotated[Mapping[str, float | str] | None, Option(
         Parameters(), "NAME VALUE",
-        "Give a global parameter a value, whatever the program says: a number or a text. Can be given several times.",
+        "Set a global parameter to a number or a text, whatever the program says. Can be given several times.",
         _MATCH, ("-p", "--param"), "label", meaning=_pairs)]
     tolerance: Annotated[str | float | None, Option(
         Text("sizes such as position=0.25,heading=5deg, or one for all", numeric=True), "LIST",
@@ -154,66 +154,66 @@ class OptionTexts(TypedDict, total=False):
         Flag(), None, "Whether SQL narrows the frames first. The matches are the same.", _HOW)]
     jobs: Annotated[int | str | None, Option(
         Count(most=4096), "N",
-        "Processes that match.  [default: one a processor, at most 8, once it is clear that it takes long; with "
-        "--shard 1]", _HOW)]
+        "Number of processes that match.  [default: 1, and once it is clear that it takes long, one for each "
+        "processor up to 8; with --shard 1]", _HOW)]
     timeout: Annotated[float | str, Option(
         Amount("s", above=True), "S", "Seconds for one frame, the solver's included; then it is unknown.",
         _HOW, about="label", field="match.timeout_s")]
     budget: Annotated[int | str, Option(
         Count(), "N", "Steps of the search for a correspondence in one frame; then the frame is unknown.",
         _HOW, about="label", field="match.budget")]
-    limit: Annotated[int | str | None, Option(Count(), "N", "Stop after so many matches.", _OUT)]
+    limit: Annotated[int | str | None, Option(Count(), "N", "Stop after N matches.", _OUT)]
     every: Annotated[bool, Option(
-        Flag(), None, "Show frames that do not match, too, each with its cause.", _OUT, ("--all",))]
+        Flag(), None, "Also show the frames that do not match, each with its cause.", _OUT, ("--all",))]
     all_matches: Annotated[bool, Option(
         Flag(), None,
-        "One line for each correspondence by which a frame matches, interchangeable objects in one order only.", _OUT)]
+        "One line for each correspondence by which a frame matches; interchangeable objects in one order only.", _OUT)]
     where: Annotated[str | None, Option(
         Text("a condition on what the program records"), "CONDITION",
         "Show only matches that meet a condition on what the program records (`record (distance to lead) as gap`): "
-        "'gap < 5', over time 'gap.minimum < 5'; also `and`, `or`, `not`. Where a value is null it is not known: such "
-        "matches are left out, and counted.", _OUT)]
+        "'gap < 5', over time 'gap.minimum < 5'; also `and`, `or`, `not`. Matches of which it is not known, because a "
+        "value is null, are left out and counted.", _OUT)]
     sort: Annotated[str | None, Option(
         Text("the name of what the program records, with `:desc` from the greatest"), "NAME[:desc]",
-        "Order matches by a value that the program records, the least first, those without one last; with --limit no "
-        "more than so many are kept in memory.", _OUT)]
+        "Order matches by a value that the program records, the least first. Matches without the value come last. With "
+        "--limit N, only N are kept in memory.", _OUT)]
     scenic: Annotated[str | None, Option(
         OneOf(tuple(_VERSIONS)), None, "Version of Scenic.  [default: inferred]",
         _MATCH, about="label", field="version", meaning=_version)]
     map_defaults: Annotated[bool, Option(
         Flag(), None,
-        "Whether the world model places and turns what the program does not: a car on the road, along it. Without a "
-        "map it never does.", _MATCH, about="label")]
+        "Whether the world model gives objects a place and a direction where the program does not: a car is on the "
+        "road, along it. Without a map it never does.", _MATCH, about="label")]
     lanes: Annotated[LaneRule, Option(
         OneOf(get_args(LaneRule)), None,
-        "Which of several lanes that contain an object are its own, as in `ego.lane`: along, those that lead within "
-        "60 degrees of its heading or go on from the last lane of its track, and all where none does or it has no "
-        "heading; any, all of them.", _MATCH, about="label")]
+        "Which lanes are an object's own, as in `ego.lane`, where several overlap. along: those within 60 degrees of "
+        "its heading and those that continue the last lane of its track, or all if there are none or it has no "
+        "heading. any: all of them.", _MATCH, about="label")]
     initial: Annotated[bool, Option(
         Flag(), None, "Ignore behaviors and other dynamic parts: match the initial scene.", _MATCH, about="label")]
     behaviors: Annotated[Behaviors, Option(
         OneOf(get_args(Behaviors)), None,
-        "What becomes of behaviors: motion runs them and compares what they do with what is seen; guards lets every "
-        "action pass; ignore leaves them out.", _TIME, about="label")]
+        "What becomes of behaviors. motion: they run, and what they do is compared with what is seen. guards: they "
+        "run, and every action passes. ignore: they are left out.", _TIME, about="label")]
     reaction: Annotated[float | str, Option(
         Amount("s"), "S", "Seconds that an object has to do what its behavior says, at each change.",
         _TIME, about="label", field="reaction_s")]
     min_duration: Annotated[float | str | None, Option(
         Amount("s"), "S",
-        "Find intervals of at least S seconds: of a program about one instant, those in which every frame matches with "
-        "the same objects.", _TIME, about="interval", field="time.min_duration_s")]
+        "Find intervals of at least S seconds. For a program about one instant, these are the intervals in which every "
+        "frame matches with the same objects.", _TIME, about="interval", field="time.min_duration_s")]
     intervals: Annotated[Intervals, Option(
         OneOf(get_args(Intervals)), None, "Report the longest of overlapping intervals, or all of them.",
         _TIME, field="time.intervals")]
     gap: Annotated[float | str, Option(
-        Amount("s", above=True), "S", "An object that has no label for longer than this is another one afterwards.",
+        Amount("s", above=True), "S", "An object that has no label for S seconds counts as another one afterwards.",
         _TIME, about="interval", field="time.gap_s")]
     ignore_params: Annotated[str | None, Option(
         Text("names of parameters, separated by commas"), "LIST", "Global parameters that are not compared.",
         _MATCH, about="label", field="match.ignore_params", meaning=_exempt)]
     strict: Annotated[bool, Option(
         Flag(), None,
-        "What the program sets and no label has is an error, not a warning; so is all that `scenicq check` warns of.",
+        "Make errors of warnings: of all that `scenicq check` warns of, and of what the program sets and no label has.",
         _MESSAGES, about="label")]
     model: Annotated[str | None, Option(Text("the name of a world model"))]
 # fmt: on

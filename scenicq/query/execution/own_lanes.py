@@ -99,7 +99,7 @@ class OwnLanes:
         return Standing(tuple(lane for lane, own in found if own), tuple(lane for lane, own in found if not own))
 
     def at_the_start(self, dataset: Dataset, results: Sequence[Result]) -> Iterator[Result]:
-        """The same intervals, in which matches name the lanes at their first frames.
+        """Put the lanes at their first frames into intervals that match.
 
         Args:
             dataset: The dataset.

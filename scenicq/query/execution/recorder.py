@@ -60,7 +60,7 @@ class Recorder:
         )
 
     def fill(self, results: Sequence[Result]) -> list[Result]:
-        """The same results, in which matches carry what is recorded."""
+        """Put the recorded values into the results that match."""
         return list(fill_by_recording(results, self._of_recording))
 
     def _of_recording(self, recording: str, results: list[Result]) -> Iterator[Result]:
@@ -84,7 +84,7 @@ class Recorder:
             marks = {leaf.span.mark for leaf in leaves(value) if leaf.span is not None}
             if any(not marks.isdisjoint(proof) for proof in proofs):
                 for place, proof in enumerate(proofs):
-                    alone = own.chosen([place])
+                    alone = own.select([place])
                     given = alone.columns(self.scenario).assigned(assignment_of((value,), proof))
                     found[place][each.name] = next(_told(alone, each, *_values(given, value)))
             else:
@@ -110,7 +110,7 @@ def _told(
 def _values(columns: AtomColumns, value: Node) -> tuple[list[RecordedCell], list[str]]:
     """A value at each sample, None where there is none, and the reason for that.
 
-    What hangs on a choice without a value, such as which of several lanes is meant, is known where all options that
+    What depends on a choice without a value, such as which of several lanes is meant, is known where all options that
     there are agree.
     """
     size, found = len(columns.samples), list[tuple[list[RecordedCell], list[str]]]()

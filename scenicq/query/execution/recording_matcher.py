@@ -20,11 +20,11 @@ from scenicq.match.verdict import Cause, Match, NoMatch, Unknown, Verdict, Witne
 from scenicq.query.execution.recording_starts import (
     DecidedStart,
     NearestRoles,
-    few_findings,
-    label_of,
-    nearest_roles,
+    decided_starts,
+    find_starts,
+    make_start_label,
+    order_by_distance,
     start_table,
-    starts_of,
 )
 from scenicq.query.execution.results import IntervalSpan, Result
 from scenicq.query.prefilter.executor import Block
@@ -33,11 +33,11 @@ from scenicq.store.classes import class_matches
 from scenicq.store.dataset import Dataset
 from scenicq.store.track_block import TrackBlock
 from scenicq.store.tracks import TrackKey
-from scenicq.temporal.hidden_runs import Remembered
+from scenicq.temporal.hidden_runs import StartLabel
 from scenicq.temporal.intervals import IntervalMatcher, IntervalVerdict
 from scenicq.temporal.necessary import NecessaryConditions
 from scenicq.temporal.outcomes import Outcome
-from scenicq.temporal.starts import RoleCandidates, StartSearch, narrowed, start_matchers
+from scenicq.temporal.starts import RoleCandidates, StartSearch, narrow_candidates, start_matchers
 from scenicq.temporal.stretches import StartTable
 from scenicq.temporal.truth import TRUE, UNKNOWN
 
@@ -92,7 +92,7 @@ class Survivors:
     read: Callable[[NDArray[np.int64]], Iterator[Candidate]]
 
     def within(self, rows: Block, objects: tuple[int, int] | None) -> Survivors:
-        """Those of some recordings of the block.
+        """Select the survivors of some recordings of the block.
 
         Args:
             rows: The recordings.
@@ -124,7 +124,7 @@ class _Asked:
         candidates = self.candidates
         if candidates is not None:
             place = np.searchsorted(candidates.labels, self.block.label_of[candidates.members])
-            candidates = narrowed(candidates, which, place)
+            candidates = narrow_candidates(candidates, which, place)
         return _Asked(self.block, self.labels[which], candidates, self.read)
 
 
@@ -215,14 +215,14 @@ class RecordingMatcher:
                 starts = self._by_outcomes(asked, starts)
             table, by_number, undecided = starts.table, starts.decided, starts.undecided
 
-            def remember(number: int) -> Remembered:
+            def remember(number: int) -> StartLabel:
                 if number in by_number:
                     return by_number[number].label, by_number[number].correspondence
                 members = {index: int(mine[number]) for index, mine in table.members.items()}
-                return label_of(self.matcher.scenario, block, members, rows.map, self._relevant)
+                return make_start_label(self.matcher.scenario, block, members, rows.map, self._relevant)
 
-            def label(scenario: Scenario, members: Mapping[int, int], relevant: Sequence[frozenset[str]]) -> Remembered:
-                return label_of(scenario, block, members, rows.map, relevant)
+            def label(scenario: Scenario, members: Mapping[int, int], relevant: Sequence[frozenset[str]]) -> StartLabel:
+                return make_start_label(scenario, block, members, rows.map, relevant)
 
             reported = self.intervals.intervals(table, remember, every=self.every, label=label)
             look()
@@ -284,11 +284,11 @@ class RecordingMatcher:
             matcher = search.rest if known else search.matcher
             label = candidate.label
             recording = int(block.recording_of[at])
-            findings = few_findings(matcher, label, known_starts.setdefault(recording, Counter()), among=among)
+            findings = find_starts(matcher, label, known_starts.setdefault(recording, Counter()), among=among)
             for each in findings:
                 if isinstance(each.verdict, NoMatch):
                     found.failed[each.verdict.cause.what] += 1
-            for start in starts_of(self.matcher.scenario, block, label, members, findings):
+            for start in decided_starts(self.matcher.scenario, block, label, members, findings):
                 if isinstance(start, Unknown):
                     undecided[at] = start
                 else:
@@ -297,7 +297,7 @@ class RecordingMatcher:
         return _Starts(table, dict(enumerate(decided, len(table) - len(decided))), undecided)
 
     def _candidates(self, block: TrackBlock, labels: NDArray[np.int64], left: Survivors) -> RoleCandidates | None:
-        """Who may play whom, if that is a matter of the label's own ego."""
+        """The candidates of each role; None unless the ego is the label's own."""
         scenario, options = self.matcher.scenario, self.matcher.options
         if options.ego != "label" or options.exact:
             return None
@@ -320,7 +320,7 @@ class RecordingMatcher:
         self, block: TrackBlock, labels: NDArray[np.int64], candidates: RoleCandidates | None,
         sure: NDArray[np.bool_], read: Iterator[Candidate],
     ) -> Iterator[tuple[int, Candidate, list[int], Mapping[int, tuple[int, ...]] | None, bool]]:  # fmt: skip
-        """Labels for the matcher, with their members, who may play whom, and whether plain requirements hold."""
+        """Labels for the matcher, with their members, candidates of the roles, and whether plain requirements hold."""
         members = _objects_of(block, labels) if candidates is None or self._whole else candidates.members
         plays: dict[int, NDArray[np.bool_]] = {}
         if candidates is not None:
@@ -345,7 +345,7 @@ class RecordingMatcher:
         """Intervals as results, with the recordings that they are of: by time, then the nearest first."""
         scenario, table = self.matcher.scenario, starts.table
         origins = np.array([each.origin for each in intervals], dtype=np.int64)
-        told = nearest_roles(scenario, table, self.matcher.plans.always_twins, origins)
+        told = order_by_distance(scenario, table, self.matcher.plans.always_twins, origins)
         order = sorted(
             range(len(told)),
             key=lambda n: (intervals[n].recording, intervals[n].start, intervals[n].end, told[n].place),
@@ -398,7 +398,7 @@ class RecordingMatcher:
         among = {index: (number,) for number, index in enumerate(others, 1)}
         for outcome, numbers in rest.items():
             found = [
-                label_of(scenario, starts.table.block, wanted[each].members, rows.map, self._relevant)
+                make_start_label(scenario, starts.table.block, wanted[each].members, rows.map, self._relevant)
                 for each in numbers
             ]
             labels = [(label, among) for label, _ in found]
@@ -413,7 +413,7 @@ class RecordingMatcher:
             for index, member in who.members.items()
             if not block.is_ego(member)
         }
-        return self._search_of(int(starts.table.outcomes[number])).matcher.match(known.label, given=given)
+        return self._search_of(int(starts.table.outcomes[number])).matcher.match(known.label, fixed_roles=given)
 
 
 def _objects_of(block: TrackBlock, labels: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -1,4 +1,8 @@
-"""Between labels and the members of a block: starts that the matcher finds, and labels of starts that arrays have."""
+"""The starts of runs in a block of recordings, between the matcher's labels and the arrays of a block.
+
+The matcher finds correspondences of a label; here they become *members*, rows of the block that follow an object over
+time. Arrays find starts as members; here they become labels, which the matcher can be asked about.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +28,15 @@ from scenicq.store.track_block import TrackBlock
 from scenicq.store.tracks import TrackKey
 from scenicq.temporal.stretches import StartTable
 
-__all__ = ["DecidedStart", "NearestRoles", "few_findings", "label_of", "nearest_roles", "start_table", "starts_of"]
+__all__ = [
+    "DecidedStart",
+    "NearestRoles",
+    "decided_starts",
+    "find_starts",
+    "make_start_label",
+    "order_by_distance",
+    "start_table",
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,12 +44,11 @@ class DecidedStart:
     """A start that the matcher has decided.
 
     Attributes:
-        members: Who plays each object of the scenario, by index, as a member of the block; interchangeable ones in the
-            order of their tracks.
-        found: The same as the matcher has found it, which the verdict is about.
+        members: The member in each role, by the role's index; interchangeable roles have theirs in the order of tracks.
+        found: The members as the matcher found them, which the verdict is about.
         verdict: A match, or unknown.
         label: The label.
-        correspondence: The label object of each object, by name.
+        correspondence: The label object of each role, by names.
     """
 
     members: Mapping[int, int]
@@ -47,19 +58,19 @@ class DecidedStart:
     correspondence: Mapping[str, str]
 
 
-def few_findings(
+def find_starts(
     matcher: Matcher, label: Label, starts: Counter[str], *, among: Candidates | None = None
 ) -> list[Finding]:
-    """What the matcher finds in a label; unknown where the recording has more starts than can be held.
+    """Find the starts in a label; the last finding is unknown if the recording has more starts than can be held.
 
     Args:
         matcher: The matcher.
         label: The label.
-        starts: How many its recording has already that match, and that are open; those of the label are added.
-        among: What is known of who may play whom.
+        starts: Counts the starts of the recording that match and that are open; those of the label are added.
+        among: Candidates of the roles, where they are known.
     """
     findings: list[Finding] = []
-    for finding in matcher.findings(label, among=among, every_open=True):
+    for finding in matcher.findings(label, candidates=among, every_open=True):
         if finding.plan is not None:
             kind = "match" if isinstance(finding.verdict, Match) else "open"
             if starts[kind] >= LIMITS.recording_starts:
@@ -70,19 +81,19 @@ def few_findings(
     return findings
 
 
-def starts_of(
+def decided_starts(
     scenario: Scenario, block: TrackBlock, label: Label, members: Sequence[int], findings: Iterable[Finding]
 ) -> Iterator[DecidedStart | Unknown]:
-    """The starts that a label makes; what is undecided without a whole correspondence stays as it is.
+    """Turn findings into starts of a block; what is undecided without a whole correspondence stays an `Unknown`.
 
     Interchangeable objects take their tracks in one order in all labels.
 
     Args:
         scenario: The scenario.
-        block: Has the label.
+        block: The block, which has the label.
         label: The label.
         members: Its ego and its objects as members of the block.
-        findings: What the matcher says of it.
+        findings: What `find_starts` found in it.
     """
     for finding in findings:
         verdict = finding.verdict
@@ -103,12 +114,12 @@ def starts_of(
 
 @dataclass(frozen=True, slots=True)
 class NearestRoles:
-    """Who plays whom in a start as it is told: interchangeable objects come nearest first.
+    """The correspondence of a start as it is reported: interchangeable objects come nearest first.
 
     Attributes:
-        members: Who plays each object, by index, as a member of the block.
-        tracks: Their tracks.
-        place: Where the start stands among others: role by role by the distance from the ego, then by name.
+        members: The member in each role, by the role's index.
+        tracks: The tracks of these members.
+        place: Sorts starts: role by role, the distance from the ego, then the name.
     """
 
     members: Mapping[int, int]
@@ -116,15 +127,15 @@ class NearestRoles:
     place: tuple[tuple[float, TrackKey], ...]
 
 
-def nearest_roles(
+def order_by_distance(
     scenario: Scenario, table: StartTable, twins: Mapping[int, int], wanted: NDArray[np.int64]
 ) -> list[NearestRoles]:
-    """How some starts are told.
+    """Order interchangeable objects of some starts by their distance from the ego, as results report them.
 
     Args:
         scenario: The scenario.
         table: The starts.
-        twins: For an object, an earlier one that is interchangeable with it over time.
+        twins: For a role, an earlier one that is interchangeable with it over time.
         wanted: The numbers of the starts.
     """
     block, ego = table.block, table.members[scenario.ego][wanted]
@@ -158,14 +169,14 @@ def start_table(
     scenario: Scenario, block: TrackBlock, arrays: Mapping[int, NDArray[np.int64]], decided: Sequence[DecidedStart],
     outcome: int = 0,
 ) -> StartTable:  # fmt: skip
-    """All starts of a block: first those that arrays have, then those that the matcher has decided.
+    """Make the table of all starts of a block: first those that arrays found, then those that the matcher decided.
 
     Args:
         scenario: The scenario.
         block: The block.
-        arrays: Starts by who plays each object.
-        decided: Starts that the matcher has decided.
-        outcome: With which outcome of the choices over time, by number.
+        arrays: The members of starts that arrays found, by role.
+        decided: Starts that the matcher decided.
+        outcome: Number of the outcome of the choices over time.
     """
     indices = sorted(owner.index for owner in scenario.objects)
     members = {
@@ -179,15 +190,15 @@ def start_table(
     return StartTable(block, members, sure.astype(np.bool_), np.full(len(sure), outcome))
 
 
-def label_of(
+def make_start_label(
     scenario: Scenario, block: TrackBlock, members: Mapping[int, int], map_name: str, relevant: Sequence[frozenset[str]]
 ) -> tuple[Label, dict[str, str]]:
-    """The label of a start with those objects alone that play a role, and what is relevant of them; who plays whom.
+    """Make the label of a start, with only the objects that play a role and what is relevant, and the correspondence.
 
     Args:
         scenario: The scenario; its ego is the label's.
         block: The block.
-        members: Who plays each object.
+        members: Row of the label object of each role.
         map_name: The map of the label.
         relevant: The properties that matter of each object.
     """

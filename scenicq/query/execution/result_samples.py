@@ -1,4 +1,8 @@
-"""The samples of results as columns: those of many results of one recording together, where they observe alike."""
+"""The samples of results as columns, so that values at the samples of many results are computed at once.
+
+A result that is a frame has one sample, and an interval has one for each of its frames. Results of one recording share
+columns where their labels observe the same properties: then the program says the same in place of what they lack.
+"""
 
 from __future__ import annotations
 
@@ -22,17 +26,17 @@ from scenicq.temporal.samples import MOVING, BoundSamples
 
 __all__ = ["ResultSamples", "ResultStretches", "assignment_of"]
 
-_PLACES = 50_000
-"""Samples of results whose values are worked out together."""
+_BATCH_SAMPLES = 50_000
+"""Samples whose values are computed together, unless one result alone has more."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class _Placed:
-    """A result with its samples.
+class _ResultRows:
+    """Where a result lies in a block.
 
     Attributes:
         first, end: Its labels in the block, the end left out.
-        members: Who plays each object at each of them; -1 where it is not seen.
+        members: For each role, the row of its label object at each of these labels; -1 where it is not observed.
     """
 
     first: int
@@ -42,13 +46,13 @@ class _Placed:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ResultStretches:
-    """The samples of some results among those of several.
+    """Some results of a recording, with their samples among those of a batch of results.
 
     Attributes:
-        samples: All samples.
-        starts, sizes: Where those of each result begin, and how many they are.
-        numbers: Which results, among all.
-        first: The number of the first one whose samples are there.
+        samples: The samples of the whole batch, result by result.
+        starts, sizes: Where the samples of each result of the batch begin, and how many they are.
+        numbers: The numbers of the selected results among all results of the recording.
+        first: The number of the batch's first result.
     """
 
     samples: BoundSamples
@@ -57,53 +61,53 @@ class ResultStretches:
     numbers: Sequence[int]
     first: int
 
-    def chosen(self, places: Sequence[int]) -> ResultStretches:
-        """The samples of some of them."""
+    def select(self, places: Sequence[int]) -> ResultStretches:
+        """Select some of the results, by their places in `numbers`."""
         return replace(self, numbers=[self.numbers[place] for place in places])
 
     def labels(self) -> NDArray[np.int64]:
-        """The labels of their samples."""
+        """The row of the label of each sample of the selected results."""
         assert self.samples.labels is not None
         return self.samples.labels[self.places()]
 
     def places(self) -> NDArray[np.int64]:
-        """The numbers of their samples, result by result."""
+        """The place in `samples` of each sample of the selected results, result by result."""
         own = np.array(self.numbers) - self.first
         return expand_ranges(self.starts[own], self.sizes[own])
 
     def bounds(self) -> NDArray[np.int64]:
-        """Where the samples of each begin among `places`, and where the last ones end."""
+        """Where the samples of each selected result begin in `places`, and the end of the last ones."""
         return np.concatenate(([0], np.cumsum(self.sizes[np.array(self.numbers) - self.first])))
 
     def slices(self) -> Iterator[slice]:
-        """The samples of each among `places`."""
+        """The samples of each selected result, as slices of `places`."""
         ends = cast("list[int]", self.bounds().tolist())
         return map(slice, ends[:-1], ends[1:])
 
     def columns(self, scenario: Scenario) -> AtomColumns:
-        """What is read at these samples, each from the start of its result."""
+        """Columns that evaluate expressions at these samples; each result begins at its own first sample."""
         ends = self.bounds()
         return AtomColumns(scenario, self.samples.at(self.places()), start=np.repeat(ends[:-1], np.diff(ends)))
 
 
 @dataclass(eq=False)
 class ResultSamples:
-    """Reads the samples of results.
+    """Reads the samples at which expressions are evaluated.
 
     Attributes:
         scenario: The scenario.
         options: Options of the matcher.
-        values: What is read at each sample.
+        values: The expressions.
     """
 
     scenario: Scenario
     options: MatchOptions
     values: tuple[Node, ...]
     _indices: dict[str, int] = field(init=False)
-    _steady: list[tuple[int, str]] = field(init=False)
+    _replaceable: list[tuple[int, str]] = field(init=False)
 
     def __post_init__(self) -> None:
-        """Find what the values read of labels that a program may say in their place."""
+        """Find properties that the expressions read, and for which the program has a value where labels lack them."""
         owners = self.scenario.every_object
         self._indices = {owner.name: owner.index for owner in owners}
         found: dict[tuple[int, str], None] = {}
@@ -117,37 +121,38 @@ class ResultSamples:
                 continue
             found[index, name] = None
             todo += features(given.value)
-        self._steady = sorted(found)
+        self._replaceable = sorted(found)
 
     def stretches(self, members: Members, matches: Sequence[Result]) -> Iterator[ResultStretches]:
-        """The samples of matches of a recording, of those together in which labels observe the same."""
+        """The samples of the matches of a recording; matches whose labels observe the same properties come together."""
         first = 0
-        for some in _in_pieces([self._placed(members, each) for each in matches]):
-            sizes = np.array([each.end - each.first for each in some])
+        for batch in _batches([self._rows_of(members, each) for each in matches]):
+            sizes = np.array([each.end - each.first for each in batch])
             starts = np.cumsum(sizes) - sizes
-            labels = expand_ranges(np.array([each.first for each in some]), sizes)
+            labels = expand_ranges(np.array([each.first for each in batch]), sizes)
             playing = {
-                index: np.concatenate([each.members.get(index, np.full(each.end - each.first, -1)) for each in some])
+                index: np.concatenate([each.members.get(index, np.full(each.end - each.first, -1)) for each in batch])
                 for index in self._indices.values()
             }
             samples = BoundSamples(members.block, playing, len(labels), labels, self.options.classes)
-            # what the program says in place of what no sample of a result has is the same whatever others are there
-            for numbers in self._alike(samples, starts, len(some)):
+            for numbers in self._group_by_observed(samples, starts, len(batch)):
                 yield ResultStretches(samples, starts, sizes, [first + number for number in numbers], first)
-            first += len(some)
+            first += len(batch)
 
-    def _placed(self, members: Members, result: Result) -> _Placed:
+    def _rows_of(self, members: Members, result: Result) -> _ResultRows:
         first = members.numbers[result.frame]
         end = first + (1 if result.interval is None else result.interval.count)
         roles = cast(Match, result.verdict).correspondence
-        who = members.at if result.interval is None else members.along
-        return _Placed(first, end, {self._indices[name]: who(named, first, end) for name, named in roles.items()})
+        find = members.at if result.interval is None else members.along
+        return _ResultRows(first, end, {self._indices[name]: find(named, first, end) for name, named in roles.items()})
 
-    def _alike(self, samples: BoundSamples, starts: NDArray[np.int64], count: int) -> list[list[int]]:
-        """The results, those together of which labels observe the same that does not change."""
-        if not self._steady:
+    def _group_by_observed(self, samples: BoundSamples, starts: NDArray[np.int64], count: int) -> list[list[int]]:
+        """Group the results of a batch by which replaceable properties any of their samples observes."""
+        if not self._replaceable:
             return [list(range(count))]
-        seen = [np.logical_or.reduceat(_is_seen(samples, index, name), starts).tolist() for index, name in self._steady]
+        seen = [
+            np.logical_or.reduceat(_is_seen(samples, index, name), starts).tolist() for index, name in self._replaceable
+        ]
         groups: dict[tuple[bool, ...], list[int]] = {}
         for number in range(count):
             groups.setdefault(tuple(each[number] for each in seen), []).append(number)
@@ -155,7 +160,7 @@ class ResultSamples:
 
 
 def assignment_of(values: Sequence[Node], witness: Mapping[str, WitnessValue]) -> dict[Identity, Value]:
-    """The values that a witness gives to random variables, where it names them without doubt."""
+    """The values that a witness gives to random variables; without those that share a place with another one."""
     places: dict[str, set[Identity]] = {}
     for leaf in leaves(*values):
         if leaf.span is not None:
@@ -177,14 +182,14 @@ def _is_seen(samples: BoundSamples, index: int, name: str) -> NDArray[np.bool_]:
     return ~np.isnan(seen[0])
 
 
-def _in_pieces(placed: Sequence[_Placed]) -> Iterator[list[_Placed]]:
-    """Results with not too many samples together."""
-    some, size = list[_Placed](), 0
-    for each in placed:
-        if some and size + each.end - each.first > _PLACES:
-            yield some
-            some, size = [], 0
-        some.append(each)
+def _batches(results: Sequence[_ResultRows]) -> Iterator[list[_ResultRows]]:
+    """Results in batches of at most `_BATCH_SAMPLES` samples; one that has more is a batch by itself."""
+    batch, size = list[_ResultRows](), 0
+    for each in results:
+        if batch and size + each.end - each.first > _BATCH_SAMPLES:
+            yield batch
+            batch, size = [], 0
+        batch.append(each)
         size += each.end - each.first
-    if some:
-        yield some
+    if batch:
+        yield batch

@@ -189,7 +189,7 @@ class ResultCount:
     unknown: Counter[str] = field(default_factory=Counter[str])
 
     def counted(self, records: Iterable[Record]) -> Iterable[Record]:
-        """The same records, counted as they are taken."""
+        """Count records while they are taken."""
         for each in records:
             self.add(each)
             yield each

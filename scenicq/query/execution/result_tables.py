@@ -116,7 +116,7 @@ def result_table(records: Iterable[Record], schema: pa.Schema) -> pa.Table:
 
     Args:
         records: The records.
-        schema: Of `result_schema`, with every role that the records name.
+        schema: As `result_schema` makes it, with every role that the records name.
     """
     kind = schema.field("recorded").type if "recorded" in schema.names else None
     return pa.Table.from_pylist([_row(each, kind) for each in records], schema=schema)

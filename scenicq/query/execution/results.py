@@ -25,7 +25,7 @@ __all__ = [
     "Result",
     "Sample",
     "Standing",
-    "up_to",
+    "limit_matches",
 ]
 
 RecordedCell = float | bool | str | tuple[float, float] | None
@@ -224,14 +224,14 @@ class Funnel:
     Attributes:
         frames: Frames looked at.
         candidates: Left after the prefilter.
-        with_roles: Of those, frames with a label object of the right class for every role.
+        with_roles: Frames among those with a label object of the right class for every role.
         matches, unknowns: Verdicts.
         excluded: How many frames failed first at which feature or requirement.
         reasons: Why frames are unknown.
-        over_time: Of a query over time: "recordings" looked at, "starts" (frames that match the initial scene),
+        over_time: For a query over time: "recordings" looked at, "starts" (frames that match the initial scene),
             "bindings" that these make, and bindings "cut off" because the recording or a track ends before the program
             does. Matches, unknowns and reasons are then those of intervals.
-        broken: Of a query over time: how many bindings without a match broke which requirement.
+        broken: For a query over time: how many bindings without a match broke which requirement.
         unrecorded: How often each recorded value is null, by the reason: `gap: not observed`.
         missing: Frames of the dataset in which a property that the program sets is missing, although others have it.
         warnings: What the user should know, such as a map that the program does not fit.
@@ -310,8 +310,8 @@ class Funnel:
                 failed[verdict.cause.what] += 1
 
 
-def up_to(limit: int | None, found: Generator[Result], funnel: Funnel) -> Generator[Result]:
-    """Results until so many matches are there; then whoever gives them is closed.
+def limit_matches(limit: int | None, found: Generator[Result], funnel: Funnel) -> Generator[Result]:
+    """Yield results until there are enough matches; then close the generator that makes them.
 
     Args:
         limit: How many; None for all.

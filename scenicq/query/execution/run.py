@@ -23,24 +23,24 @@ from scenicq.geometry.abstract_map import AbstractNetwork, NeedsMapError
 from scenicq.geometry.map_traits import MapTraits
 from scenicq.geometry.network import Network
 from scenicq.match.options import MatchOptions
-from scenicq.match.problem.preprocess import ready
+from scenicq.match.problem.preprocess import prepare_scenario
 from scenicq.match.verdict import Cause, NoMatch
 from scenicq.query.execution.block_executor import BlockExecutor
 from scenicq.query.execution.block_matcher import MAPS_KEPT, CompiledMap, Decided, Decider, has_timelines
-from scenicq.query.execution.compiled_map import (
+from scenicq.query.execution.frames_ahead import FramesAhead, telling
+from scenicq.query.execution.merged_blocks import merge_frames, merge_intervals, until_deadline
+from scenicq.query.execution.never_compared import Coverage, coverage
+from scenicq.query.execution.program_files import SiblingFiles
+from scenicq.query.execution.program_map import (
     about_dataset,
     is_about_map,
     map_remark,
     misfit_remarks,
     program_remarks,
 )
-from scenicq.query.execution.frames_ahead import FramesAhead, telling
-from scenicq.query.execution.merged_blocks import merge_frames, merge_intervals, until_deadline
-from scenicq.query.execution.never_compared import Coverage, coverage
-from scenicq.query.execution.program_files import SiblingFiles
 from scenicq.query.execution.recorded_columns import RecordedColumn, columns_of
 from scenicq.query.execution.result_selection import ResultSelection
-from scenicq.query.execution.results import Funnel, Result, up_to
+from scenicq.query.execution.results import Funnel, Result, limit_matches
 from scenicq.query.execution.scenario_copies import ScenarioCopies
 from scenicq.query.prefilter.executor import Block, Extent, blocks, blocks_of, extents, names, whole_recordings
 from scenicq.query.prefilter.plan import Plan
@@ -220,7 +220,7 @@ class Query:
             label_attributes=self._label_attributes,
         )  # fmt: skip
         check_enforced(scenario, self.options.match.enforce)
-        return ready(scenario)
+        return prepare_scenario(scenario)
 
     def _label_attributes(self) -> Mapping[str, frozenset[type]]:
         if self._known.attributes is None:
@@ -366,7 +366,7 @@ class Query:
                 self.funnel.warnings.append(remark)
 
     def notes(self, maps: Iterable[str] | None = None) -> list[Diagnostic]:
-        """How the program is read where that hangs on the dataset, and what it cannot record, each thing once.
+        """How the program is read where that depends on the dataset, and what it cannot record, each thing once.
 
         Arguments as of `fitting`.
         """
@@ -461,7 +461,7 @@ class Query:
         return any(map(has_timelines, self._scenarios()))
 
     def with_timelines(self, results: Sequence[Result]) -> list[Result]:
-        """The same results, in which intervals that match say what their roles do from when to when.
+        """Put timelines into intervals that match: what their roles do from when to when.
 
         Args:
             results: The results, those of one recording together.
@@ -527,7 +527,7 @@ class Query:
         """What decides the blocks of this query in one process; to be used in a `with` statement.
 
         Args:
-            threads: Of the database; as many as it likes by default.
+            threads: Threads of the database; by default as many as it likes.
         """
         options = self.options
         return Decider(
@@ -591,7 +591,7 @@ class Query:
         Raises:
             ScenarioError: The program is wrong or not supported.
         """
-        return up_to(self.limit, self._all_results(progress), self.funnel)
+        return limit_matches(self.limit, self._all_results(progress), self.funnel)
 
     def _all_results(self, progress: Callable[[int], None] | None) -> Generator[Result]:
         lacking = self._lacking_maps()

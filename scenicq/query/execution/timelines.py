@@ -18,7 +18,7 @@ from scenicq.forest.walk import leaves
 from scenicq.match.options import MatchOptions
 from scenicq.match.verdict import Match, WitnessValue
 from scenicq.query.execution.members import Members, fill_by_recording
-from scenicq.query.execution.recording_starts import label_of
+from scenicq.query.execution.recording_starts import make_start_label
 from scenicq.query.execution.result_samples import ResultSamples, ResultStretches, assignment_of
 from scenicq.query.execution.results import ModeRecord, ProgramPlace, Result
 from scenicq.store.dataset import Dataset
@@ -64,7 +64,7 @@ class _Variant:
         return frozenset(owner.name for owner in self.scenario.every_object)
 
     def read(self, outcome: int) -> list[str]:
-        """The random variables that conditions over time hang on, with an outcome."""
+        """The random variables that conditions over time depend on, with an outcome."""
         if outcome not in self._read:
             scenario = self.outcomes[outcome].scenario
             conditions = () if scenario.dynamics is None else scenario.dynamics.conditions
@@ -103,7 +103,7 @@ class Timelines:
         self._variants = [_Variant(each, self.options) for each in self.scenario.variants or (self.scenario,)]
 
     def fill(self, results: Sequence[Result]) -> list[Result]:
-        """The same intervals, in which matches say what their roles do."""
+        """Put timelines into intervals that match."""
         return list(fill_by_recording(results, self._of_recording))
 
     def _of_recording(self, recording: str, results: list[Result]) -> Iterator[Result]:
@@ -142,7 +142,7 @@ class Timelines:
             look()
             scenario = variant.outcomes[number].scenario
             assert scenario.dynamics is not None
-            some = own.chosen(places)
+            some = own.select(places)
             truths = self._truths(variant, scenario, some, dict(values))
             labels = some.labels()
             for which, chosen in zip(some.numbers, some.slices(), strict=True):
@@ -169,7 +169,7 @@ class Timelines:
             def label(
                 scene: Scenario, members: Mapping[int, int], relevant: Sequence[frozenset[str]]
             ) -> tuple[Label, Mapping[str, str]]:
-                return label_of(scene, block, members, self.map_name, relevant)
+                return make_start_label(scene, block, members, self.map_name, relevant)
 
             found.update(variant.arrivals.truths(own.samples.at(own.places()), own.bounds(), label))
         return found

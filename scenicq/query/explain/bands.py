@@ -44,7 +44,7 @@ class Band:
         span: Where it says so.
         values: The truth value at each sample: of a condition there, of a requirement from there to the end.
         is_requirement: Whether it is a requirement.
-        sides: Of a condition that compares numbers, both at each sample; nan where there is none.
+        sides: Both sides, at each sample, of a condition that compares numbers; nan where there is none.
     """
 
     what: str

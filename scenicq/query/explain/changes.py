@@ -32,10 +32,10 @@ __all__ = [
     "change_tolerance",
     "combine",
     "drop_requirement",
+    "find_least",
     "ignore_param",
     "interval_length",
-    "least",
-    "longest_with",
+    "longest_interval",
     "shift_comparison",
     "show_tolerance",
     "skip_property",
@@ -91,7 +91,7 @@ class Change:
         return CompiledMap.of(scenario, world.network, changed.match, prefilter=changed.prefilter), changed
 
 
-def least(
+def find_least(
     holds: Callable[[float], bool], ladder: Sequence[float], *, low: float = 0.0, finest: float = FINEST_M,
     relative: float = 0.0,
 ) -> float | None:  # fmt: skip
@@ -119,7 +119,7 @@ def least(
     return high
 
 
-def longest_with(query: Query, recording: str, map_name: str, change: Change) -> Result | None:
+def longest_interval(query: Query, recording: str, map_name: str, change: Change) -> Result | None:
     """The longest interval of a recording that matches with a change, given its map; None where none does."""
     compiled, options = change.compiled(query.compiled_map(map_name), query.options)
     results = query.alone(recording, map_name, compiled, options).results()

@@ -20,7 +20,7 @@ from scenicq.match.explanation import (
     Satisfied,
     Undecided,
     describe_constraint,
-    encoded,
+    encode_groups,
 )
 from scenicq.match.matcher import Matcher
 from scenicq.match.verdict import Match, NoMatch, Unknown, Verdict, WitnessValue
@@ -28,14 +28,25 @@ from scenicq.query.execution.own_lanes import OwnLanes, show_standing
 from scenicq.query.execution.results import Standing
 from scenicq.query.explain.changes import show_tolerance
 from scenicq.query.explain.margins import SatisfiedConstraint, margins
-from scenicq.query.explain.nearest_miss import Closest, closest, separated
+from scenicq.query.explain.nearest_miss import Closest, closest, narrow_advice
 from scenicq.query.explain.violations import Violation, violations
 from scenicq.smt.smtlib import to_smtlib
 from scenicq.store.labels import Label
 
-__all__ = ["Explanation", "GroupScript", "Proof", "explain", "explain_match", "show_explanation"]
+__all__ = ["REASONS", "Explanation", "GroupScript", "Proof", "explain", "explain_match", "show_explanation"]
 
 _WIDEST = 60
+REASONS = {
+    "unobserved": "the label does not tell what the program asks",
+    "timeout": "the time for one frame was over (--timeout)",
+    "budget": "there are more possibilities than a limit allows",
+    "nonlinear": "the built-in solver cannot decide products and rotations of random values like these",
+    "precision": "the answer of the solver does not hold when it is evaluated",
+    "unsupported": "no formula for solvers can say it",
+    "crash": "the process that decided it died",
+    "garbage": "the solver gave no answer that can be read",
+}
+"""What the reasons of `Unknown` mean; other reasons are sentences already."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +80,7 @@ class Explanation:
         correspondence: The one that matches, else the one that comes closest, else a partial one.
         proofs: The values that prove a match, in the order of the program.
         margins: What a match shows of each feature and requirement, in the order of the program.
-        violations: What the closest correspondence breaks, the first to be blamed first.
+        violations: What the closest correspondence breaks, or what is not decided of it; the first to blame first.
         closest: The smallest tolerance under which the frame would match; None if it matches, or if none would do.
         formulas: The groups under that correspondence.
         lanes: In which lanes its roles stand whose lanes the program asks for, by name.
@@ -100,7 +111,7 @@ def explain(matcher: Matcher, label: Label, *, formulas: bool = False) -> Explan
     nearest = closest(matcher, label)
     if nearest is None or not isinstance(nearest.finding.verdict, Match):
         return _without_match(matcher, label, finding, formulas=formulas)
-    nearest = separated(matcher, label, nearest)
+    nearest = narrow_advice(matcher, label, nearest)
     assert isinstance(nearest.finding.verdict, Match)
     found = replace(nearest.finding, search=_again(matcher, nearest.finding))
     return Explanation(
@@ -149,7 +160,7 @@ def _again(matcher: Matcher, finding: Finding) -> LabelSearch | None:
 
 
 def _without_match(matcher: Matcher, label: Label, finding: Finding, *, formulas: bool) -> Explanation:
-    """No tolerance helps: say what excluded the correspondence that came furthest."""
+    """No tolerance helps: say what excludes the correspondence that came furthest, or what is not decided of it."""
     match finding.verdict:
         case NoMatch():
             cause, shown = finding.verdict.cause, finding.verdict.partial
@@ -161,9 +172,10 @@ def _without_match(matcher: Matcher, label: Label, finding: Finding, *, formulas
     found: tuple[Violation, ...] = ()
     if failure is not None and finding.search is not None and isinstance(finding.verdict, NoMatch):
         found = violations(matcher, finding.search, failure.group, failure.assignment)
-    if not found:
-        told = "is not met" if isinstance(finding.verdict, NoMatch) else "is not decided"
-        found = (Violation(cause.what, told, cause.detail, cause.span),)
+    if not found and isinstance(finding.verdict, Unknown):
+        found = (Violation(cause.what, "is not decided", cause.detail, cause.span, finding.verdict.reason),)
+    elif not found:
+        found = (Violation(cause.what, "is not met", cause.detail, cause.span),)
     lanes = OwnLanes(matcher.scenario).of_label(label, shown)
     return Explanation(label.frame, finding.verdict, shown, violations=found, lanes=lanes)
 
@@ -195,7 +207,8 @@ def _violations(matcher: Matcher, finding: Finding) -> tuple[Violation, ...]:
             found += violations(matcher, attempt, each.group, finding.assignment)
         elif isinstance(outcome, Undecided):
             what = describe_constraint(matcher.scenario, outcome.constraint)
-            found.append(Violation(what, f"not decided ({outcome.reason})", "", outcome.constraint.span))
+            span, reason = outcome.constraint.span, outcome.reason
+            found.append(Violation(what, "is not decided", outcome.detail, span, reason))
     return tuple(found)
 
 
@@ -217,7 +230,7 @@ def _formula(
     outcome = attempt.decide(plan.groups[number - 1], assignment)
     verdict = {Satisfied: "sat", Refuted: "unsat", Undecided: "unknown"}[type(outcome)]
     try:
-        problem = encoded([attempt.items(group, assignment)], matcher.options).problem
+        problem = encode_groups([attempt.items(group, assignment)], matcher.options).problem
         text = to_smtlib(problem, matcher.options.precision)
     except CannotEvaluate as error:
         text = f"; no formula: {error}\n"
@@ -292,6 +305,10 @@ def _show_violation(violation: Violation) -> str:
         message = f"no label object can play `{role}`"
     else:
         message = f"`{violation.what}` {violation.value}".rstrip()
+    code, verdict = "frame-excluded", "excluded"
+    if violation.reason:
+        code, verdict = "frame-undecided", "undecided"
+        message += f": {REASONS.get(violation.reason, violation.reason)}"
     if violation.span is None:
-        return f"excluded: {message}" + (f"\n  {violation.allowed}" if violation.allowed else "")
-    return render(Diagnostic("frame-excluded", message, violation.span, violation.allowed, severity="excluded"))
+        return f"{verdict}: {message}" + (f"\n  {violation.allowed}" if violation.allowed else "")
+    return render(Diagnostic(code, message, violation.span, violation.allowed, severity=verdict))

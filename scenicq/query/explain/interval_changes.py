@@ -70,7 +70,7 @@ def least_changes(
     Args:
         columns: Over the samples of the interval.
         formula: A formula over conditions.
-        conditions: Of the program, by number.
+        conditions: Conditions of the program, by number.
         ends: Whether the formula need only hold at some sample: of the condition of a termination.
         goes_on: Whether the interval is cut off, so that the formula need only be such that it may still hold.
         quick: Whether to bisect, which finds the least where the formula holds for all larger changes, too.

@@ -15,11 +15,11 @@ from scenicq.match.matcher import Matcher
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown, Verdict
 from scenicq.query.execution.interval_frames import locate
 from scenicq.query.execution.recording_matcher import CUT_OFF
-from scenicq.query.execution.recording_starts import DecidedStart, few_findings, start_table, starts_of
+from scenicq.query.execution.recording_starts import DecidedStart, decided_starts, find_starts, start_table
 from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query
 from scenicq.query.explain.bands import Band, bands_of, columns_of, conditions_over, show_bands
-from scenicq.query.explain.changes import longest_with, shift_comparison
+from scenicq.query.explain.changes import longest_interval, shift_comparison
 from scenicq.query.explain.frame_explanation import explain, show_explanation
 from scenicq.query.explain.interval_changes import Shift, least_changes
 from scenicq.query.explain.mode_explanation import run_modes
@@ -32,7 +32,7 @@ from scenicq.temporal.intervals import IntervalMatcher, IntervalVerdict
 from scenicq.temporal.starts import start_matchers
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN
 
-__all__ = ["IntervalExplanation", "changes_of", "explain_beginning", "explain_recording", "placed"]
+__all__ = ["IntervalExplanation", "changes_of", "explain_beginning", "explain_recording", "locate_interval"]
 
 
 _AROUND_SHOWN = 5
@@ -181,7 +181,7 @@ def explain_recording(query: Query, solver: Solver, name: str, begins: int | flo
     Args:
         query: A query over time.
         solver: Decides what is not decided otherwise.
-        name: Of the recording.
+        name: Name of the recording.
         begins: Where the interval shall begin: a timestamp in microseconds, or, as a float, the seconds from where the
             recording begins, to half the time between two frames; anywhere by default.
 
@@ -228,8 +228,8 @@ def _explain_variant(
             unknown: list[str] = []
             before = len(starts)
             for outcome, matcher in enumerate(matchers):
-                findings = few_findings(matcher, label, known)
-                found = [*starts_of(scenario, block, label, members, findings)]
+                findings = find_starts(matcher, label, known)
+                found = [*decided_starts(scenario, block, label, members, findings)]
                 starts += [(each, outcome) for each in found if isinstance(each, DecidedStart)]
                 unknown = [each.reason for each in found if isinstance(each, Unknown)] or unknown
                 causes += [each.verdict.cause.what for each in findings if not isinstance(each.verdict, Match)]
@@ -258,7 +258,7 @@ def _explain_variant(
     # one of several variants is not tried again by itself
     tried = () if query.compiled_map(labels[0].map).scenario.variants else changes_of(scenario, tracks, best)
     shifts = [shift_comparison(each, best.broken) for each in tried[: LIMITS.ranked_numbers]]
-    changes = tuple(each.text for each in shifts if longest_with(query, name, labels[0].map, each) is not None)
+    changes = tuple(each.text for each in shifts if longest_interval(query, name, labels[0].map, each) is not None)
     over = conditions_over(scenario, tracks, best)
     bands = bands_of(scenario, over)
     least_s = None if dynamic else query.options.time.min_duration_s
@@ -390,8 +390,8 @@ def _is_after(block: TrackBlock, start: _Start, samples: Mapping[tuple[tuple[int
     return binding in samples and int(block.label_of[next(iter(members.values()))]) >= samples[binding]
 
 
-def placed(query: Query, result: Result) -> tuple[Scenario, RecordingTracks, IntervalVerdict]:
-    """The interval of a result: the scenario over its map, its recording, and where in it who plays whom.
+def locate_interval(query: Query, result: Result) -> tuple[Scenario, RecordingTracks, IntervalVerdict]:
+    """Find the interval of a result: the scenario over its map, its recording, and the roles and samples in it.
 
     Raises:
         ValueError: The result is of a frame.

@@ -23,14 +23,14 @@ from scenicq.query.explain.changes import (
     Change,
     change_duration,
     change_tolerance,
+    find_least,
     interval_length,
-    least,
-    longest_with,
+    longest_interval,
     shift_comparison,
     show_tolerance,
 )
-from scenicq.query.explain.interval_explanation import changes_of, placed
-from scenicq.query.explain.nearest_miss import tell_cut, widened, with_parts
+from scenicq.query.explain.interval_explanation import changes_of, locate_interval
+from scenicq.query.explain.nearest_miss import tell_cut, widen_tolerance, with_parts
 
 __all__ = ["nearest_intervals"]
 
@@ -78,7 +78,7 @@ def nearest_intervals(query: Query, count: int) -> list[Result]:
         nearer = _bound(near, count)
         if widening_m > nearer and widening_m / 10 > nearer:
             break
-        for each in _under(every, widened(query.options.match.tolerance, widening_m)):
+        for each in _under(every, widen_tolerance(query.options.match.tolerance, widening_m)):
             if each.recording in seen:
                 continue
             if len(seen) - len(matching) >= LIMITS.ranked_recordings:
@@ -121,7 +121,7 @@ def _tries(query: Query, recording: str) -> Callable[[Change], Result | None]:
     with query.dataset.connect() as connection:
         found = connection.execute("SELECT map FROM labels WHERE recording = ? LIMIT 1", [recording]).fetchone()
     assert found is not None
-    return partial(longest_with, query, recording, found[0])
+    return partial(longest_interval, query, recording, found[0])
 
 
 def _near(found: Result | None, change: Change) -> _Near | None:
@@ -138,11 +138,11 @@ def _by_number(query: Query, results: Sequence[Result]) -> _Near | None:
 
     Args:
         query: The query.
-        results: Of one recording, at least one, none of which matches.
+        results: Results of one recording, at least one, none of which matches.
     """
     changes: list[Change] = []
     for result in results:
-        scenario, tracks, interval = placed(query, result)
+        scenario, tracks, interval = locate_interval(query, result)
         changes += [
             shift_comparison(each, interval.broken) for each in changes_of(scenario, tracks, interval, quick=True)
         ]
@@ -184,10 +184,10 @@ def _by_tolerance(query: Query, recording: str, enough_m: float, most_m: float) 
         return change_tolerance(show_tolerance(made(query.options.match.tolerance)), made, about="tolerance")
 
     def all_wider(widening_m: float) -> Change:
-        return wider(lambda each: widened(each, widening_m))
+        return wider(lambda each: widen_tolerance(each, widening_m))
 
     ladder = [most_m] if most_m < enough_m else [enough_m]
-    size = least(lambda widening_m: longest(all_wider(widening_m)) is not None, ladder, relative=0.01)
+    size = find_least(lambda widening_m: longest(all_wider(widening_m)) is not None, ladder, relative=0.01)
     if size is None:
         return None
     # one part alone is better advice

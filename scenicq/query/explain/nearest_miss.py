@@ -28,7 +28,7 @@ from scenicq.query.execution.block_matcher import CompiledMap
 from scenicq.query.execution.lazy_solver import LazySolver
 from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query
-from scenicq.query.explain.changes import FINEST_M, LADDER_M, MOST_M, least, show_tolerance
+from scenicq.query.explain.changes import FINEST_M, LADDER_M, MOST_M, find_least, show_tolerance
 from scenicq.query.prefilter.executor import names, run_prefilter
 from scenicq.query.prefilter.plan import make_plan
 from scenicq.store.labels import Label
@@ -36,10 +36,10 @@ from scenicq.store.labels import Label
 __all__ = [
     "Closest",
     "closest",
+    "narrow_advice",
     "nearest_misses",
-    "separated",
     "tell_cut",
-    "widened",
+    "widen_tolerance",
     "with_parts",
 ]
 
@@ -65,7 +65,7 @@ class Closest:
     alone: tuple[Tolerance, ...] = ()
 
 
-def widened(tolerance: Tolerance, widening_m: float) -> Tolerance:
+def widen_tolerance(tolerance: Tolerance, widening_m: float) -> Tolerance:
     """A tolerance widened by so many metres, in the sense of this module."""
     return tolerance.widened(widening_m, widening_m * _HEADING_PER_M)
 
@@ -116,7 +116,7 @@ def closest(matcher: Matcher, label: Label, most_m: float = MOST_M) -> Closest |
     def matches(widening_m: float) -> bool:
         if widening_m in reached:
             return True
-        tolerance = widened(patient.tolerance, widening_m)
+        tolerance = widen_tolerance(patient.tolerance, widening_m)
         finding = matcher.relaxed(replace(patient, tolerance=tolerance)).examine(label)
         if isinstance(finding.verdict, Match):
             reached[widening_m] = Closest(widening_m, tolerance, finding)
@@ -128,11 +128,11 @@ def closest(matcher: Matcher, label: Label, most_m: float = MOST_M) -> Closest |
     if most_m < MOST_M and not matches(most_m):
         return None
     ladder = [*(size for size in LADDER_M if size < most_m), most_m]
-    found = least(matches, ladder, relative=0.01)
+    found = find_least(matches, ladder, relative=0.01)
     return None if found is None else reached[found]
 
 
-def separated(matcher: Matcher, label: Label, found: Closest) -> Closest:
+def narrow_advice(matcher: Matcher, label: Label, found: Closest) -> Closest:
     """What is advised for a label: no part wider than it must be, and the parts that are enough alone.
 
     Args:
@@ -156,7 +156,7 @@ def separated(matcher: Matcher, label: Label, found: Closest) -> Closest:
         # widened alone, a part must be at least as wide as all together
         sizes = [found.widening_m, *(size for size in LADDER_M if size > found.widening_m)]
         too_little = max(0.0, 0.98 * found.widening_m - FINEST_M)
-        size = least(partial(_enough, at, part, {}), sizes, low=too_little)
+        size = find_least(partial(_enough, at, part, {}), sizes, low=too_little)
         if size is not None:
             alone.append((size, with_parts(base.tolerance, {part: size})))
     if alone:
@@ -168,7 +168,7 @@ def separated(matcher: Matcher, label: Label, found: Closest) -> Closest:
         if at(rest):
             parts = rest
         else:
-            size = least(partial(_enough, at, part, rest), [parts[part]])
+            size = find_least(partial(_enough, at, part, rest), [parts[part]])
             parts[part] = parts[part] if size is None else size
     finding = at(parts)
     if finding is None:
@@ -185,7 +185,7 @@ def _enough(
 
 def _frames(query: Query, world: CompiledMap, widening_m: float) -> Iterator[tuple[int, str]]:
     """The frames that the prefilter of a widened tolerance leaves, each with its number on the map."""
-    options = replace(query.options.match, tolerance=widened(query.options.match.tolerance, widening_m))
+    options = replace(query.options.match, tolerance=widen_tolerance(query.options.match.tolerance, widening_m))
     plan = make_plan(world.scenario, world.network, options)
     number = 0
     with closing(query.dataset.connect()) as connection:
@@ -283,7 +283,7 @@ def tell_cut(query: Query, most: int, what: str) -> None:
 
 
 def _result(matcher: Matcher, label: Label, found: Closest) -> Result:
-    advice = separated(matcher, label, found)
+    advice = narrow_advice(matcher, label, found)
     assert isinstance(advice.finding.verdict, Match)
     told = " or ".join(map(show_tolerance, advice.alone or (advice.tolerance,)))
     verdict = NoMatch(Cause("tolerance", f"would match with {told}"), advice.finding.verdict.correspondence)

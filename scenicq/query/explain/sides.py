@@ -11,7 +11,7 @@ from scenicq.errors import CannotEvaluate
 from scenicq.forest.groups import PARAMS, Condition, Group
 from scenicq.forest.nodes import Compare, Constant, Distance, Identity, Logic, LogicOp, Node, Norm, Value
 from scenicq.forest.walk import features, leaves
-from scenicq.match.explanation import LabelSearch, conditioned
+from scenicq.match.explanation import LabelSearch, condition_items
 
 __all__ = ["Side", "amount", "sides"]
 
@@ -33,7 +33,7 @@ class Side:
         negated: Whether it stands under a `not`, and so must be false.
         true: Whether it is as it must be.
         apart: How far the values are apart.
-        unit: Of the values: "deg", "m" or empty.
+        unit: Unit of the values: "deg", "m" or empty.
     """
 
     text: str
@@ -56,7 +56,7 @@ def sides(
         attempt: The label.
         constraint: The requirement.
         assignment: The correspondence.
-        values: Of the random variables.
+        values: Values of the random variables.
     """
     stack: list[tuple[Node, bool]] = [(constraint.expression, True)]
     while stack:
@@ -106,6 +106,6 @@ def _known(
         items = attempt.items(alone, assignment)
     except CannotEvaluate:
         return None
-    part = conditioned(items, values)[0][1]
+    part = condition_items(items, values)[0][1]
     known = part.value if isinstance(part, Constant) else None
     return known if isinstance(known, float) else None

@@ -1,8 +1,8 @@
-"""How many matches there are by a tolerance alone: with exact positions, or headings, they would not be.
+"""How many matches depend on the tolerance: frames that would not match if positions, or headings, had to be exact.
 
-They are matched again with that part of the tolerance left out, as many as there is time for, in an order that chance
-gives; intervals at their first frames, with whoever plays the roles: no tolerance holds in conditions over time.
-What is undecided does not count.
+Matches are decided again without that part of the tolerance, in random order and as many as there is time for. An
+interval is decided at its first frame with the objects in its roles, since tolerances do not apply to conditions over
+time. A frame that is then undecided does not count.
 """
 
 from __future__ import annotations
@@ -25,19 +25,19 @@ from scenicq.store.labels import Label
 __all__ = ["ToleranceShare", "by_tolerance_alone"]
 
 _TOGETHER = 10
-"""Matches of which frames are read together."""
+"""Matches whose frames are read at once."""
 _LONGEST_S = 0.1
-"""Seconds for one match."""
+"""Seconds for one match, after which it counts as undecided."""
 _PLACES = ("position", "x", "y")
 
 
 @dataclass(frozen=True, slots=True)
 class ToleranceShare:
-    """How many of some matches there are by a tolerance alone.
+    """How many matches depend on the tolerance.
 
     Attributes:
-        matches: How many were looked at.
-        positions, headings: How many of them would not match with exact positions, or headings.
+        matches: The number of matches that were decided again.
+        positions, headings: How many of them would not match with exact positions, or with exact headings.
     """
 
     matches: int
@@ -46,7 +46,7 @@ class ToleranceShare:
 
 
 def by_tolerance_alone(query: Query, matches: Sequence[Result], budget_s: float) -> ToleranceShare:
-    """How many of some matches there are by a tolerance alone, as far as there is time.
+    """Count how many of some matches depend on the tolerance, as far as there is time.
 
     Args:
         query: The query that finds them.
@@ -86,7 +86,7 @@ def _fails(matcher: Matcher, label: Label, result: Result) -> bool:
     # others come later
     there = {each.name for each in matcher.scenario.objects}
     roles = {name: member for name, member in roles_in(label, result).items() if name in there}
-    return isinstance(matcher.match(label, given=roles), NoMatch)
+    return isinstance(matcher.match(label, fixed_roles=roles), NoMatch)
 
 
 def _exact_places(tolerance: Tolerance) -> Tolerance:

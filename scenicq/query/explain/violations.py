@@ -27,7 +27,7 @@ from scenicq.match.explanation import (
 )
 from scenicq.match.matcher import Matcher
 from scenicq.match.tolerance import Tolerance
-from scenicq.query.explain.changes import least
+from scenicq.query.explain.changes import find_least
 from scenicq.query.explain.sides import sides
 
 __all__ = ["Violation", "allowed_values", "choices", "distance_off", "violations"]
@@ -40,19 +40,21 @@ _FINEST = 1e-4
 
 @dataclass(frozen=True, slots=True)
 class Violation:
-    """A constraint that a correspondence breaks.
+    """A constraint that a correspondence breaks, or of which it is not known whether it does.
 
     Attributes:
         what: The feature or requirement, in the words of the program.
         value: What the label has, such as "is 137.2 deg".
-        allowed: What was allowed, and how far off the value is.
+        allowed: What was allowed, and how far off the value is; of what is not decided, what is missing.
         span: Where the program says it.
+        reason: Why it is not decided, as `Unknown.reason`; empty where it is broken.
     """
 
     what: str
     value: str
     allowed: str
     span: Span | None
+    reason: str = ""
 
 
 def violations(
@@ -191,4 +193,4 @@ def distance_off(constraint: Comparison, node: Node, observed: Value) -> float |
         wide = Tolerance(position=size, heading=size, other=size)
         return isinstance(decide_decomposed([(constraint, node, observed)], wide), Satisfied)
 
-    return 0.0 if reached(0.0) else least(reached, [high], finest=_FINEST)
+    return 0.0 if reached(0.0) else find_least(reached, [high], finest=_FINEST)

@@ -15,7 +15,7 @@ from scenicq.forest.scenario import Scenario, ScenarioObject
 from scenicq.geometry.network import Network
 from scenicq.limits import LIMITS
 from scenicq.match.options import MatchOptions
-from scenicq.match.problem.preprocess import ready
+from scenicq.match.problem.preprocess import prepare_scenario
 from scenicq.match.tolerance import SLACK
 from scenicq.query.prefilter.condition_reader import EGO, ColumnCondition
 from scenicq.query.prefilter.conditions import necessary_conditions, sufficient_conditions
@@ -136,7 +136,7 @@ def make_plan(
         deciding: Whether SQL is to say, too, which frames surely match.
         counting: Whether somebody reads which step a frame misses first; if not, it is any one.
     """
-    scenario, own_ego = ready(scenario), options.ego == "label"
+    scenario, own_ego = prepare_scenario(scenario), options.ego == "label"
     relations = MapRelations(RegionNames(network), scenario.ego)
     found = list(necessary_conditions(scenario, network, options, relations)) if own_ego else []
     columns: dict[tuple[str, ...], str] = {}

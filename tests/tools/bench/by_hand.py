@@ -23,7 +23,7 @@ from fleet import Fleet, write_store
 from hand_sql import MACROS, QUESTIONS
 
 from scenicq.errors import Source
-from scenicq.garbage import seldom_collected
+from scenicq.garbage import collect_seldom
 from scenicq.match.options import MatchOptions
 from scenicq.match.verdict import Match
 from scenicq.query.execution.records import json_text, record
@@ -76,7 +76,7 @@ def main() -> None:
     parser.add_argument("--only", default="", help="questions with this in their names")
     given = parser.parse_args()
     # as in the process of the command
-    seldom_collected()
+    collect_seldom()
     rows: list[dict[str, object]] = []
     with tempfile.TemporaryDirectory() as temporary:
         store = (given.stores or Path(temporary)) / f"{given.frames}"

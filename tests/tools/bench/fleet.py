@@ -23,7 +23,7 @@ from shapely.geometry import mapping
 
 from scenicq.geometry.default_street import street
 from scenicq.geometry.features import LINES, REFERENCES, MapFeature, names
-from scenicq.importers.base import Entry, Labels
+from scenicq.importers.base import LabelChecker, RecordingEntry
 from scenicq.importers.report import Report
 from scenicq.importers.segments import Job, RecordingTask, World, fingerprint, write_segments
 from scenicq.store.columns import MemberColumns, RecordingColumns
@@ -220,7 +220,7 @@ class FleetReader:
     fleet: Fleet
     numbers: tuple[int, ...]
 
-    def recordings(self, labels: Labels, report: Report) -> Iterator[RecordingColumns]:
+    def recordings(self, labels: LabelChecker, report: Report) -> Iterator[RecordingColumns]:
         """In order."""
         return (self.fleet.recording(number) for number in self.numbers)
 
@@ -234,7 +234,7 @@ def write_store(fleet: Fleet, target: Path, jobs: int) -> Manifest:
         waiting: list[Job] = []
         first = 0
         for number, group in enumerate(groups):
-            mark = fingerprint([repr(fleet)], [Entry(name, 0, "") for name in group], frozenset())
+            mark = fingerprint([repr(fleet)], [RecordingEntry(name, 0, "") for name in group], frozenset())
             shares = tuple(RecordingTask(name, "", FleetReader(fleet, (first + n,))) for n, name in enumerate(group))
             waiting.append(Job(number, shares, mark))
             first += len(group)

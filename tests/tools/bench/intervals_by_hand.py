@@ -27,7 +27,7 @@ import numpy as np
 from intervals import HEAD, QUESTIONS, recordings
 
 from scenicq.errors import Source
-from scenicq.garbage import seldom_collected
+from scenicq.garbage import collect_seldom
 from scenicq.match.verdict import Match
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.columns import RecordingColumns
@@ -330,7 +330,7 @@ def main() -> None:
     parser.add_argument("--frames", type=int, default=20_000)
     parser.add_argument("--only", default="", help="questions with this in their names")
     given = parser.parse_args()
-    seldom_collected()
+    collect_seldom()
     rows: list[dict[str, object]] = []
     with tempfile.TemporaryDirectory() as folder:
         write_dataset(Path(folder) / "short", recordings(given.frames), {}, name="short")

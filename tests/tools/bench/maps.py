@@ -21,7 +21,7 @@ from pathlib import Path
 from fleet import moved
 
 from scenicq.errors import Source
-from scenicq.garbage import seldom_collected
+from scenicq.garbage import collect_seldom
 from scenicq.importers.ingest import ingest
 from scenicq.query.execution.records import json_text, record
 from scenicq.query.execution.run import Query, QueryOptions
@@ -73,7 +73,7 @@ def _moved_recording(columns: RecordingColumns, name: str, dx: float, dy: float)
 
 def ask(folder: Path, text: str, *, proofs: bool) -> None:
     """Ask a question, and print processor time, memory and matches."""
-    seldom_collected()
+    collect_seldom()
     started, matches = time.process_time(), 0
     options = QueryOptions(proofs=proofs, reasons=proofs, interval_reasons=proofs)
     for result in Query(open_dataset(folder, check=False), Source("p.scenic", text), options).results():

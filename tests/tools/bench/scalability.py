@@ -198,7 +198,7 @@ def ways(scenario: Scenario, solver: Patient) -> list[Decider]:
     auto = matcher("auto")
 
     def by_auto(known: Mapping[str, str]) -> Callable[[Label], bool]:
-        return lambda label: isinstance(auto.match(label, given=known), Match)
+        return lambda label: isinstance(auto.match(label, fixed_roles=known), Match)
 
     own = [
         Decider(KNOWN, by_auto(given), known=True, rounds=ROUNDS),

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from scenicq.importers.ingest import ingest
-from scenicq_cli.report import plain
+from scenicq_cli.report import printable
 
 EVIL = "\x1b[31mcar\x07\nX\u202e"
 SHOWN = r"\x1b[31mcar\x07\nX\u202e"
@@ -29,8 +29,8 @@ def _clean(text):
 
 
 def test_control_characters_are_shown():
-    assert plain("a\tb\x9b\x7f\n\u2028c") == "a\\tb\\x9b\\x7f\n\\u2028c"
-    assert plain("Straße 道路") == "Straße 道路"
+    assert printable("a\tb\x9b\x7f\n\u2028c") == "a\\tb\\x9b\\x7f\n\\u2028c"
+    assert printable("Straße 道路") == "Straße 道路"
 
 
 @pytest.mark.slow

@@ -24,7 +24,7 @@ from scenicq.store.dataset import open_dataset
 from scenicq.store.frame_names import ShortNames, find_recording
 from scenicq_cli.main import cli
 from scenicq_cli.report import moment
-from scenicq_cli.table import Table, TextStream, fitted
+from scenicq_cli.table import Table, TextStream, table_lines
 
 UUIDS = ("7fab2350-7eaf-3b7e-a39d-6937a4c1bede", "7fab9911-0510-35b0-a2fa-b4cea13a6d76")
 
@@ -60,7 +60,7 @@ def test_it_is_no_wider_than_the_terminal_and_breaks_no_word(width, made):
     short = ShortNames(
         lambda frame: "/".join(part[-24:] if "/" not in frame else part[:8] for part in frame.split("/")), str
     )
-    lines = fitted(table, width, short)
+    lines = table_lines(table, width, short)
     assert max(map(len, lines)) <= width
     words = {word for line in lines for word in line.split()}
     for row in table:
@@ -87,16 +87,16 @@ def test_tables_look_so(width, golden):
         beginnings = {
             row[0]: "/".join(part[:10] if "/" in row[0] else part[-6:] for part in row[0].split("/")) for row in table
         }
-        tables.append("\n".join(fitted(table, width, ShortNames(beginnings.__getitem__, str))))
+        tables.append("\n".join(table_lines(table, width, ShortNames(beginnings.__getitem__, str))))
     golden("\n\n".join(tables) + "\n")
 
 
 def test_what_fits_is_not_left_out():
-    assert "20:48:20.44" in fitted(list(tokens()), 85, TAIL)[1]
+    assert "20:48:20.44" in table_lines(list(tokens()), 85, TAIL)[1]
 
 
 def test_a_date_that_all_share_stands_in_the_head():
-    lines = fitted(list(dated()), 80, TAIL)
+    lines = table_lines(list(dated()), 80, TAIL)
     assert "2018-09-18" in lines[0]
     assert not any("2018-09-18" in line for line in lines[1:])
 

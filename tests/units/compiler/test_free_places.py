@@ -20,7 +20,7 @@ from scenicq.forest.walk import postorder
 from scenicq.geometry.elements import NetworkElement
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
-from scenicq.match.problem.preprocess import ready
+from scenicq.match.problem.preprocess import prepare_scenario
 from scenicq.match.tolerance import EXACT
 from scenicq.match.verdict import Match
 from scenicq.store.labels import Label, LabelObject
@@ -109,7 +109,7 @@ def test_a_point_that_something_else_depends_on_stays() -> None:
         "p = new Point on road\nother = new Car on network.laneAt(p), facing Range(-180, 180) deg\n"
         "require (distance from ego to p) < 20\n"
     )
-    assert fields(ready(scenario)) == fields(scenario) > 0
+    assert fields(prepare_scenario(scenario)) == fields(scenario) > 0
 
 
 def unevenness(scenario: Scenario, first: shapely.Geometry) -> float:
@@ -134,6 +134,6 @@ def test_lanes_are_drawn_one_as_likely_as_the_other_also_when_made_ready() -> No
 
 
 def test_a_scenario_is_made_ready_once() -> None:
-    scenario = ready(compiled("other = new Object on Uniform(*network.lanes)\n"))
-    assert ready(scenario) is scenario
+    scenario = prepare_scenario(compiled("other = new Object on Uniform(*network.lanes)\n"))
+    assert prepare_scenario(scenario) is scenario
     assert Matcher(scenario).scenario is scenario

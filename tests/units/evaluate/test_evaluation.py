@@ -23,7 +23,7 @@ from scenicq.evaluate.region_of_interest import RegionOfInterest
 from scenicq.evaluate.rows import COLUMNS, evaluation_record, flat_rows, overview
 from scenicq.evaluate.simulation import read_simulated
 from scenicq.geometry.features import MapFeature
-from scenicq.importers.motion import euler
+from scenicq.importers.motion import pose_of_euler_angles
 from scenicq.importers.prediction_files import read_predictions
 from scenicq.importers.predictions import ARGOVERSE2, NUSCENES, Predictions
 from scenicq.query.execution.program_files import read_program
@@ -375,8 +375,8 @@ def lone_box(frame: str, **values: float) -> Predictions:
 def tilted(folder: Path, *, height: float | None = 2.0) -> Dataset:
     """An ego with its front down by 0.1 and its left side up by 0.2; in its frame a car 10 m ahead and 1 m above."""
     ego = LabelObject("ego", "Car", "EGO_VEHICLE", 100.0, 50.0, 0.5, out_of_plane=OutOfPlane(height, 0.1, 0.2))
-    pose = euler(0.2, 0.1, 0.5 + math.pi / 2, (100.0, 50.0, 2.0))
-    car = pose.then(euler(0.0, 0.0, 0.3, (10.0, 0.0, 1.0)))
+    pose = pose_of_euler_angles(0.2, 0.1, 0.5 + math.pi / 2, (100.0, 50.0, 2.0))
+    car = pose.compose(pose_of_euler_angles(0.0, 0.0, 0.3, (10.0, 0.0, 1.0)))
     x, y, z = car.origin
     other = LabelObject("a", "Car", "REGULAR_VEHICLE", x, y, car.heading, 2.0, 4.0, 1.5,
                         attributes={"num_interior_pts": 9},

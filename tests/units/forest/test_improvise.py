@@ -17,7 +17,7 @@ from scenicq.forest.containment_pruning import _area
 from scenicq.forest.draws import draw_leaf
 from scenicq.forest.evaluate import evaluate_all
 from scenicq.forest.improvise import Improviser
-from scenicq.forest.inline import assemble
+from scenicq.forest.inline import inline_scenario
 from scenicq.forest.nodes import Constant, Identity, Leaf, TruncatedNormal, Undefined, Value
 from scenicq.forest.scenario import BuiltIn, Scenario
 from scenicq.geometry.default_street import street
@@ -33,7 +33,7 @@ def compiled(text: str) -> Scenario:
 
 def plain_rejection(scenario: Scenario, rng: random.Random) -> Iterator[dict[tuple[int, str], Value]]:
     """The definition: draw all, keep what meets every hard condition."""
-    parts = assemble(scenario, ALL)
+    parts = inline_scenario(scenario, ALL)
     roots = (*(check.condition for check in parts.checks), *parts.values.values())
     while True:
         drawn: dict[Identity, Value] = {}

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from scenicq.geometry.camera import Camera, box_corners, box_edges, quaternion_matrix
-from scenicq.importers.motion import euler, quaternion
+from scenicq.importers.motion import pose_of_euler_angles, pose_of_quaternion
 
 # at the origin, 1.5 m high, looking along +y: x right is the map's +x, y down its -z
 NORTH = Camera(800, 600, (400.0, 400.0, 400.0, 300.0), (0.0, 0.0, 1.5), (math.sqrt(0.5), -math.sqrt(0.5), 0.0, 0.0))
@@ -22,16 +22,16 @@ def test_the_camera_looks_along_its_z_axis() -> None:
     matrix = quaternion_matrix(NORTH.rotation)
     assert matrix @ np.array([0, 0, 1]) == pytest.approx([0, 1, 0])
     assert matrix @ np.array([0, 1, 0]) == pytest.approx([0, 0, -1])
-    again = quaternion(*NORTH.rotation, (0.0, 0.0, 0.0))
+    again = pose_of_quaternion(*NORTH.rotation, (0.0, 0.0, 0.0))
     for column, axis in zip(matrix.T, (again.x, again.y, again.z), strict=True):
         assert axis == pytest.approx(column.tolist())
 
 
 def test_corners_are_those_of_a_turned_box() -> None:
     corners = box(10, 20, 0, heading=0.4, pitch=0.1, roll=-0.2)
-    pose = euler(-0.2, 0.1, 0.4 + math.pi / 2, (10.0, 20.0, 0.0))
-    assert corners[0].tolist() == pytest.approx(pose.place((2.0, -1.0, -0.75)))
-    assert corners[6].tolist() == pytest.approx(pose.place((-2.0, 1.0, 0.75)))
+    pose = pose_of_euler_angles(-0.2, 0.1, 0.4 + math.pi / 2, (10.0, 20.0, 0.0))
+    assert corners[0].tolist() == pytest.approx(pose.transform_point((2.0, -1.0, -0.75)))
+    assert corners[6].tolist() == pytest.approx(pose.transform_point((-2.0, 1.0, 0.75)))
     assert corners.mean(axis=0).tolist() == pytest.approx([10, 20, 0])
 
 

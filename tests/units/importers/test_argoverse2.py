@@ -19,7 +19,7 @@ from scenicq.errors import DataError
 from scenicq.geometry import angles
 from scenicq.geometry.network import Network
 from scenicq.importers.argoverse2 import Argoverse2
-from scenicq.importers.base import Options
+from scenicq.importers.base import ImportOptions
 from scenicq.importers.ingest import ingest
 from scenicq.importers.report import Report
 from scenicq.store.classes import is_subclass
@@ -39,7 +39,7 @@ def source(tmp_path: Path) -> Path:
 
 def recordings(path: Path) -> list[list[Label]]:
     report = Report()
-    return [labels_of(each) for each in Argoverse2().read(path, Options(), report).recordings(report)]
+    return [labels_of(each) for each in Argoverse2().read(path, ImportOptions(), report).recordings(report)]
 
 
 def change(source: Path, name: str, edit: Callable[[list[dict[str, Any]]], object]) -> None:
@@ -54,14 +54,14 @@ def test_logs_without_boxes_are_counted(source: Path) -> None:
     bare = Path(shutil.copytree(source / "val" / LOG, source / "val" / "bare"))
     (bare / "annotations.feather").unlink()
     report = Report()
-    Argoverse2().read(source, Options(), report)
+    Argoverse2().read(source, ImportOptions(), report)
     assert [(entry.name, entry.count) for entry in report.counts if "log" in entry.name] == [
         ("log without annotations.feather", 1)
     ]
 
 
 def test_lanes_know_their_groups_roads_and_intersection() -> None:
-    source = Argoverse2().read(SAMPLE, Options(), Report())
+    source = Argoverse2().read(SAMPLE, ImportOptions(), Report())
     network = Network(LOG, source.maps[LOG])
     assert not network.problems
     lanes = {lane.id: lane for lane in network.lanes}

@@ -17,7 +17,7 @@ from scenicq.errors import DataError
 from scenicq.exporters.interchange import write_interchange
 from scenicq.geometry.camera import Camera, box_corners, box_edges
 from scenicq.importers.ingest import ingest
-from scenicq.importers.motion import quaternion
+from scenicq.importers.motion import pose_of_quaternion
 from scenicq.store.dataset import Dataset, open_dataset
 from scenicq.store.labels import Label, LabelObject, OutOfPlane, Recording
 from scenicq.store.rules import check_part
@@ -67,9 +67,9 @@ def test_cameras_of_nuscenes(nuscenes: Path, tmp_path: Path) -> None:
     for label in taken(nuscenes, tmp_path / "d").labels():
         assert set(label.cameras) == {"CAM_FRONT"}
         camera, row = label.cameras["CAM_FRONT"], poses[files[label.sensors["CAM_FRONT"]]["ego_pose_token"]]
-        vehicle = quaternion(*row["rotation"], tuple(row["translation"]))
-        expected = vehicle.then(quaternion(*AHEAD, tuple(mount["translation"])))
-        found = quaternion(*camera.rotation, camera.position)
+        vehicle = pose_of_quaternion(*row["rotation"], tuple(row["translation"]))
+        expected = vehicle.compose(pose_of_quaternion(*AHEAD, tuple(mount["translation"])))
+        found = pose_of_quaternion(*camera.rotation, camera.position)
         for axis in ("x", "y", "z", "origin"):
             assert getattr(found, axis) == pytest.approx(getattr(expected, axis))
         assert camera[:3] == (640, 360, (500, 510, 320, 180))
@@ -133,10 +133,10 @@ def test_cameras_of_argoverse(argoverse: Path, tmp_path: Path) -> None:
     for label in taken(argoverse, tmp_path / "d").labels():
         row = by_time[int(label.frame.rpartition("/")[2])]
         turn = (row[f"q{axis}"] for axis in "wxyz")
-        vehicle = quaternion(*turn, (row["tx_m"], row["ty_m"], row["tz_m"]))
+        vehicle = pose_of_quaternion(*turn, (row["tx_m"], row["ty_m"], row["tz_m"]))
         camera = label.cameras["ring_front_center"]
-        assert camera.position == pytest.approx(vehicle.place((1.5, 0.0, 1.4)))
-        assert quaternion(*camera.rotation, (0, 0, 0)).z == pytest.approx(vehicle.x)
+        assert camera.position == pytest.approx(vehicle.transform_point((1.5, 0.0, 1.4)))
+        assert pose_of_quaternion(*camera.rotation, (0, 0, 0)).z == pytest.approx(vehicle.x)
         space = label.ego.out_of_plane
         assert space is not None
         assert (space.pitch, space.roll) == pytest.approx((vehicle.pitch, vehicle.roll))

@@ -11,7 +11,7 @@ import pytest
 
 from scenicq.errors import DataError, Source
 from scenicq.geometry.network import Network
-from scenicq.importers.base import Options
+from scenicq.importers.base import ImportOptions
 from scenicq.importers.commonroad import CommonRoad
 from scenicq.importers.ingest import ingest
 from scenicq.importers.report import Report
@@ -73,7 +73,7 @@ def test_what_is_not_exact_or_no_object_is_counted(file: Path, tmp_path: Path) -
 
 
 def test_map() -> None:
-    source = CommonRoad().read(SAMPLE, Options(), Report())
+    source = CommonRoad().read(SAMPLE, ImportOptions(), Report())
     old, new = (Network(name, source.maps[name]) for name in (OLD, NEW))
     for network in (old, new):
         assert network.roadDirection.values(30, -1) == pytest.approx((-math.pi / 2,))

@@ -17,7 +17,7 @@ import pytest
 
 from scenicq.errors import DataError
 from scenicq.geometry.network import Network
-from scenicq.importers.base import Options
+from scenicq.importers.base import ImportOptions
 from scenicq.importers.ingest import IngestSummary, ingest
 from scenicq.importers.interaction import Interaction
 from scenicq.importers.lanelet2_map import utm
@@ -198,7 +198,7 @@ class TestInteraction:
         assert [label.timestamp_us for label in labels][:2] == [100_000, 200_000]
 
     def test_lanelets(self) -> None:
-        source = Interaction().read(SAMPLES / "interaction_tiny", Options(), Report())
+        source = Interaction().read(SAMPLES / "interaction_tiny", ImportOptions(), Report())
         network = Network("TINY_Street", source.maps["TINY_Street"])
         lanes = {lane.id: lane for lane in network.lanes}
         # All four share their left line with the opposite lane, which runs backwards for two of them.

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from label_rows import labels_of
 
 from scenicq.geometry.angles import normalize
-from scenicq.importers.base import ClassNames, Labels
+from scenicq.importers.base import ClassNames, LabelChecker
 from scenicq.importers.interchange_labels import LabelLines
 from scenicq.importers.report import Report
 from scenicq.store.columns import RecordingColumns
@@ -79,7 +79,7 @@ def read(lines: list[bytes], angle: str = "heading") -> tuple[RecordingColumns |
     taken = LabelLines("r", ClassNames(CLASSES, report), angle, report)
     for number, line in enumerate(lines, start=1):
         taken.add(line, f"labels.jsonl:{number}")
-    found = Labels({"town", "x", "ego"}, report).sound(taken.columns(), taken.places, taken.maps)
+    found = LabelChecker({"town", "x", "ego"}, report).check_columns(taken.columns(), taken.places, taken.maps)
     return pickle.loads(pickle.dumps(found)), report
 
 
@@ -119,7 +119,7 @@ def test_sound_labels_are_what_json_says(labels: list[dict[str, Any]], yaw: bool
     labels = json.loads(json.dumps(labels).replace('"heading"', f'"{angle}"'))
     columns, report = read([json.dumps(label).encode() for label in labels], angle)
     assert columns is not None
-    assert {problem.code for problem in report.told} <= {"assumed"}
+    assert {problem.code for problem in report.problems} <= {"assumed"}
     found = labels_of(columns)
     assert [label.timestamp_us for label in found] == sorted(label["timestamp_us"] for label in labels)
     by_id = {label["id"]: label for label in labels}
@@ -154,7 +154,7 @@ def test_what_is_not_there_is_told(labels: list[dict[str, Any]], draw: st.DataOb
         assert sum(len(label.objects) for label in found) + left["object"] == sum(
             len(label["objects"]) for label in labels
         )
-    for problem in report.told:
+    for problem in report.problems:
         assert problem.message.startswith(
             ("labels.jsonl:", "labels have no map", "class ", "recording ", "an angle", "map ")
         )
@@ -184,7 +184,7 @@ def test_what_is_wrong_with_an_object_is_told_with_its_path(field: str, told: st
     columns, report = read([f"{text[:-3]}, {field}}}]}}".encode()])
     assert columns is not None
     assert list(columns.objects.id) == ["a"]
-    assert [problem.message for problem in report.told] == [f"labels.jsonl:1: object `b` of label `f`: {told}"]
+    assert [problem.message for problem in report.problems] == [f"labels.jsonl:1: object `b` of label `f`: {told}"]
 
 
 def test_a_field_of_no_list_is_counted_and_what_is_beside_it_read() -> None:
@@ -218,5 +218,5 @@ def test_a_line_that_is_no_label(line: bytes, told: str) -> None:
     columns, report = read([line, json.dumps(LINE | {"objects": []}).encode()])
     assert columns is not None
     assert list(columns.frames) == ["f"]
-    (problem,) = report.told
+    (problem,) = report.problems
     assert problem.message.startswith(f"labels.jsonl:1: {told}")

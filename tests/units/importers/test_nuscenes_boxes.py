@@ -15,7 +15,7 @@ from label_rows import labels_of
 from msgspec import DecodeError
 
 from scenicq.geometry.angles import normalize
-from scenicq.importers.base import Options
+from scenicq.importers.base import ImportOptions
 from scenicq.importers.fields import InvalidError
 from scenicq.importers.nuscenes import NuScenes
 from scenicq.importers.nuscenes_boxes import BoxReader
@@ -240,7 +240,7 @@ def tiny(folder: Path, table: str, change: Any) -> tuple[list[RecordingColumns],
             change(rows)
         (folder / file.name).write_text(json.dumps(rows, indent=0))
     report = Report()
-    return list(NuScenes().read(folder, Options(), report).recordings(report)), report
+    return list(NuScenes().read(folder, ImportOptions(), report).recordings(report)), report
 
 
 def test_a_bad_row_among_good_ones_is_named(tmp_path: Path) -> None:
@@ -255,7 +255,7 @@ def test_a_bad_row_among_good_ones_is_named(tmp_path: Path) -> None:
     row = json.loads((TINY / "v1.0-tiny" / "sample_annotation.json").read_bytes())[3]["token"]
     line = table.index(f'"token": "{row}",')
     expected = f"sample_annotation.json:{line}: annotation `{row}`: `rotation` is not a unit quaternion"
-    assert [problem.message for problem in report.told if problem.what == "object"] == [expected]
+    assert [problem.message for problem in report.problems if problem.what == "object"] == [expected]
     counts = [sum(len(one.objects.id) for one in found) for found in (before, after)]
     assert counts[1] == counts[0] - 1
 
@@ -279,7 +279,7 @@ def test_an_annotation_that_is_there_twice_counts_once(tmp_path: Path) -> None:
     found, report = tiny(folder, "sample_annotation", lambda rows: rows.append(rows[0]))
     assert sum(len(one.objects.id) for one in found) == 12
     assert [
-        (problem.what, "is used twice" in problem.message) for problem in report.told if problem.what == "object"
+        (problem.what, "is used twice" in problem.message) for problem in report.problems if problem.what == "object"
     ] == [("object", True)]
 
 
@@ -301,4 +301,4 @@ def test_half_a_character_is_left_out(tmp_path: Path, field: str) -> None:
     folder = tmp_path / "v1.0-tiny"
     folder.mkdir()
     _, report = tiny(folder, "sample_annotation", lambda rows: rows[0].update({field: "\ud800"}))
-    assert any("half of a character" in problem.message for problem in report.told)
+    assert any("half of a character" in problem.message for problem in report.problems)

@@ -62,7 +62,7 @@ def read(folder: Path) -> list[Any]:
         tables.sensors,
         [scene.digest() for scene in content],
         report.tally,
-        sorted(each.message for each in report.told),
+        sorted(each.message for each in report.problems),
     ]
 
 

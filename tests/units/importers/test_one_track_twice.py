@@ -8,7 +8,7 @@ import pytest
 
 from scenicq.errors import DataError, Source
 from scenicq.geometry.default_street import street
-from scenicq.importers.base import Labels
+from scenicq.importers.base import LabelChecker
 from scenicq.importers.ingest import ingest
 from scenicq.importers.report import Report
 from scenicq.query.execution.run import Query, QueryOptions
@@ -33,10 +33,10 @@ LABEL = Label("f", "r", 1, STREET.name, thing("ego", 0.0, None), (
 
 def test_every_importer_keeps_the_first_and_tells_of_the_others():
     report = Report()
-    recording = Labels({STREET.name}, report).recording("r", [(LABEL, "source line 7")])
+    recording = LabelChecker({STREET.name}, report).check_labels("r", [(LABEL, "source line 7")])
     assert recording is not None
     assert list(recording.objects.id) == ["a", "c", "d", "e"]
-    assert [each.message for each in report.told] == [
+    assert [each.message for each in report.problems] == [
         f"source line 7: object `{id_}` of label `f`: has the track `t` of object `a`, which is kept"
         for id_ in ("b", "g")
     ]
@@ -46,11 +46,11 @@ def test_an_object_with_the_ego_s_track_is_left_out():
     """The importer that takes an object for the ego and leaves it among the objects, too, is told."""
     report = Report()
     label = replace(LABEL, ego=replace(LABEL.ego, track="u"))
-    recording = Labels({STREET.name}, report).recording("r", [(label, "source line 7")])
+    recording = LabelChecker({STREET.name}, report).check_labels("r", [(label, "source line 7")])
     assert recording is not None
     assert list(recording.objects.id) == ["a", "d", "e"]
     assert "source line 7: object `c` of label `f`: has the track `u` of object `ego`, which is kept" in [
-        each.message for each in report.told
+        each.message for each in report.problems
     ]
 
 
@@ -82,7 +82,7 @@ def test_verification_tells_of_a_dataset_that_has_one_track_twice(tmp_path):
 
 
 def test_no_interval_takes_two_objects_of_a_label_for_one(tmp_path):
-    recording = Labels({STREET.name}, Report()).recording("r", [(LABEL, "")])
+    recording = LabelChecker({STREET.name}, Report()).check_labels("r", [(LABEL, "")])
     assert recording is not None
     write_dataset(tmp_path / "d", iter([recording]), {STREET.name: STREET.features}, name="once")
     text = (

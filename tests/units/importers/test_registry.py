@@ -14,7 +14,7 @@ import pytest
 
 from scenicq.errors import DataError
 from scenicq.importers import registry
-from scenicq.importers.base import OpenedSource, Options
+from scenicq.importers.base import ImportOptions, OpenedSource
 from scenicq.importers.report import Report
 
 SAMPLES = Path(__file__).parents[3] / "sample_data"
@@ -34,7 +34,7 @@ class Greedy:
     def recognises(self, path: Path) -> bool:
         return True
 
-    def read(self, path: Path, options: Options, report: Report) -> OpenedSource:
+    def read(self, path: Path, options: ImportOptions, report: Report) -> OpenedSource:
         raise NotImplementedError
 
 

@@ -21,7 +21,7 @@ import pytest
 
 from scenicq.errors import DataError
 from scenicq.importers import segments
-from scenicq.importers.base import Labels
+from scenicq.importers.base import LabelChecker
 from scenicq.importers.ingest import Progress, ingest
 from scenicq.importers.interchange import LineReader
 from scenicq.importers.report import Report
@@ -182,7 +182,7 @@ def test_a_recording_that_kills_is_named(tmp_path: Path) -> None:
 class Deadly:
     """A reader that ends its process."""
 
-    def recordings(self, labels: Labels, report: Report) -> Iterator[RecordingColumns]:
+    def recordings(self, labels: LabelChecker, report: Report) -> Iterator[RecordingColumns]:
         os.kill(os.getpid(), signal.SIGKILL)
         yield columns_of(Recording("never", "", ()))
 
@@ -273,7 +273,7 @@ def test_an_update_reads_recordings_of_a_segment_that_are_new_or_have_changed(
     read: list[str] = []
     original = LineReader.recordings
 
-    def recordings(self: LineReader, labels: Labels, report: Report) -> Iterator[RecordingColumns]:
+    def recordings(self: LineReader, labels: LabelChecker, report: Report) -> Iterator[RecordingColumns]:
         read.extend(self.lines.runs)
         yield from original(self, labels, report)
 

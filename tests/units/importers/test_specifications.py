@@ -18,7 +18,7 @@ from label_rows import labels_of
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.importers import opendrive, opendrive_worker
-from scenicq.importers.base import Options
+from scenicq.importers.base import ImportOptions
 from scenicq.importers.registry import importers
 from scenicq.importers.report import Report
 
@@ -43,7 +43,7 @@ def take_in(format_: str, document: Document, folder: Path) -> tuple[str, str, M
     report = Report()
     try:
         maps = opendrive.convert_maps({file.stem: file for file in folder.glob("*.xodr")}, folder, report)
-        source = importers()[FORMATS[format_].importer].read(folder, Options(maps=maps, scratch=folder), report)
+        source = importers()[FORMATS[format_].importer].read(folder, ImportOptions(maps=maps, scratch=folder), report)
         maps = [
             (name, feature, feature.shape.wkt, feature.properties)
             for name in source.maps

@@ -13,11 +13,11 @@ import pytest
 
 from scenicq.errors import DataError
 from scenicq.geometry.network import Network
-from scenicq.importers.base import Options
+from scenicq.importers.base import ImportOptions
 from scenicq.importers.fields import InvalidError
 from scenicq.importers.ingest import ingest
 from scenicq.importers.lane_parts import Beside, cut_lanes
-from scenicq.importers.protobuf import integers, parse, signed
+from scenicq.importers.protobuf import integers, parse, to_signed
 from scenicq.importers.report import Report
 from scenicq.importers.tfrecord import crc32c, records
 from scenicq.importers.waymo import Waymo
@@ -60,7 +60,7 @@ def test_messages() -> None:
     assert list(integers(message[2])) == [1, 127]
     assert message[3] == [1.0]
     assert message[4] == [1.0]
-    assert signed(parse(b"\x08" + b"\xff" * 9 + b"\x01")[1][0]) == -1
+    assert to_signed(parse(b"\x08" + b"\xff" * 9 + b"\x01")[1][0]) == -1
 
 
 @pytest.mark.parametrize("content", [b"\x08", b"\x12\x05ab", b"\x19abc", b"\x0b", b"\xff" * 12, b"\x08" + b"\x80" * 20])
@@ -70,7 +70,7 @@ def test_what_is_no_message(content: bytes) -> None:
 
 
 def test_lanes_have_a_nominal_width_and_a_direction() -> None:
-    source = Waymo().read(SAMPLE, Options(), Report())
+    source = Waymo().read(SAMPLE, ImportOptions(), Report())
     network = Network(FIRST, source.maps[FIRST])
     assert network.roadDirection.values(30, -1.75) == pytest.approx((-math.pi / 2,))
     assert network.lanes[0].polygon.area == pytest.approx(60 * 3.5)

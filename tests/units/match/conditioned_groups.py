@@ -9,7 +9,7 @@ from scenes import STREET, compiled, drawn, label_of
 
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
-from scenicq.match.problem.candidates import find_candidates
+from scenicq.match.problem.candidates import prepare_label
 from scenicq.match.search.label_search import LabelSearch
 from scenicq.match.tolerance import EXACT
 
@@ -20,7 +20,7 @@ def groups(text, seed):
     rng = random.Random(seed)
     label = label_of(scenario, drawn(scenario, seed), rng, distractors=2)
     options = MatchOptions(tolerance=EXACT)
-    cast = find_candidates(scenario, label, 0, options, {})
+    cast = prepare_label(scenario, label, 0, options, {})
     matcher = Matcher(scenario, options)
     attempt = LabelSearch(scenario, options, cast, matcher.ask)
     found = {thing.id: number for number, thing in enumerate((label.ego, *label.objects))}

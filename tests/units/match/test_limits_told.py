@@ -8,7 +8,7 @@ import pytest
 from programs import HEADER, PROGRAMS
 from scenes import compiled, drawn, label_of
 
-from scenicq.limits import LIMITS, exhausted
+from scenicq.limits import LIMITS, limit_exceeded
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.search.outcome_tables import tree_of
@@ -37,5 +37,5 @@ def test_a_frame_that_a_limit_leaves_unknown_says_which(limit: str, monkeypatch:
     verdict = Matcher(scenario, MatchOptions(tolerance=EXACT)).match(label)
     assert isinstance(verdict, Unknown)
     # where boxes are what decides then, these get too small or too many
-    told = [(error.reason, error.detail) for error in map(exhausted, (limit, "heading_width", "pruned_boxes"))]
+    told = [(error.reason, error.detail) for error in map(limit_exceeded, (limit, "heading_width", "pruned_boxes"))]
     assert (verdict.reason, verdict.cause.detail) in told

@@ -167,8 +167,8 @@ def test_given_roles_restrict_the_search():
     scenario = compiled(HEADER + "ego = new Car\nother = new Car ahead of ego by Range(1, 30)")
     label = frame(car("a", 1.75, 60.0), car("b", 1.75, 70.0), car("c", 5.25, 70.0))
     matcher = Matcher(scenario, MatchOptions(tolerance=EXACT))
-    assert matcher.match(label, given={"other": "b"}).correspondence["other"] == "b"
-    assert isinstance(matcher.match(label, given={"other": "c"}), NoMatch)
+    assert matcher.match(label, fixed_roles={"other": "b"}).correspondence["other"] == "b"
+    assert isinstance(matcher.match(label, fixed_roles={"other": "c"}), NoMatch)
     assert [match.correspondence["other"] for match in matcher.matches(label)] == ["a", "b"]
 
 
@@ -257,7 +257,7 @@ def test_what_the_solver_does_not_decide_is_unknown_with_its_reason(method, reas
 @pytest.mark.parametrize("method", ["auto", "smt", "monolithic"])
 def test_what_the_built_in_solver_leaves_open_is_unknown_where_there_is_no_other(method, solver, monkeypatch):
     # nor is a question made that nobody is asked: for fields at hidden points that takes seconds
-    monkeypatch.setattr(solver_step, "encoded", None)
+    monkeypatch.setattr(solver_step, "encode_groups", None)
     assert verdict(NONLINEAR, frame(THERE), solver, method=method).reason == "nonlinear"
 
 

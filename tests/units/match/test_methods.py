@@ -32,7 +32,7 @@ def correspondences(scenario, label):
 def brute_force(scenario, label, options, solver=None):
     """The verdict of one formula per correspondence, and the correspondences that it allows."""
     matcher = Matcher(scenario, replace(options, method="monolithic"), solver)
-    verdicts = [(given, matcher.match(label, given=given)) for given in correspondences(scenario, label)]
+    verdicts = [(given, matcher.match(label, fixed_roles=given)) for given in correspondences(scenario, label)]
     allowed = [given for given, verdict in verdicts if isinstance(verdict, Match)]
     if allowed:
         return Match, allowed

@@ -37,7 +37,7 @@ def test_over_time_it_counts_what_intervals_come_from():
         ("after the prefilter", "20", True),
         ("frames that match the initial scene", "9", True),
         ("ways to give the objects tracks from there on", "5", False),
-        ("of these ways cut off: the recording or a track ends before the program", "3", False),
+        ("ways cut off, as the recording or a track ends before the program", "3", False),
         ("intervals that match", "1", False),
         ("intervals that are unknown", "0", False),
     ]

@@ -23,7 +23,7 @@ from scenicq.report.outlines import allowed_headings, allowed_place
 from scenicq.report.picture import Shot, caption, draw, view_of
 from scenicq.report.placement import Placement
 from scenicq.report.png import can_make_png, png
-from scenicq.report.scene import draw_text, observed_by
+from scenicq.report.scene import draw_text, observe_roles
 from scenicq.report.svg import Plane, element, escape
 from scenicq.store.dataset import open_dataset
 from scenicq.store.labels import Label, LabelObject
@@ -92,7 +92,7 @@ def test_allowed_places_and_headings_hold_what_matches(shoot, pattern, scenario)
                 here = shapely.Point(role.member.x, role.member.y)
                 assert drawn.area(path).distance(here) < PIXEL_M, drawn.title(path)
                 places += 1
-            allowed = allowed_headings(shot.scenario, role.index, observed_by(shot.roles))
+            allowed = allowed_headings(shot.scenario, role.index, observe_roles(shot.roles))
             if allowed is not None:
                 turns = [(role.member.heading - low) % math.tau <= high - low + 0.01 for low, high in allowed]
                 assert any(turns) or any(
@@ -244,7 +244,7 @@ def test_distances_of_requirements_are_drawn(crossroads, tmp_path):
     (label,) = dataset.labels([found.frame])
     scenario, network = query.compile(label.map)
     shot = Shot(label, scenario, found.verdict)
-    ways = measured_distances(scenario, observed_by(shot.roles), LARGE)
+    ways = measured_distances(scenario, observe_roles(shot.roles), LARGE)
     other = shot.roles[1].member
     assert len(ways) == 2, "each distance once"
     assert ways[0] == ((label.ego.x, label.ego.y), (other.x, other.y))

@@ -13,7 +13,7 @@ from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.dataset import open_dataset
 from scenicq.store.writer import write_dataset
 from scenicq.temporal.interval_options import IntervalOptions
-from scenicq.temporal.selection import chosen
+from scenicq.temporal.selection import choose_intervals
 
 
 def expected(intervals: list[tuple[int, int, int, float]], least: float) -> list[tuple[int, int]]:
@@ -38,7 +38,7 @@ def test_the_longest_of_overlapping_intervals_are_kept():
             found.append((start, end, draw.choice([0, 1, 2]), float(times[end] - times[start])))
         starts, ends, truth, lasting = (np.array([each[k] for each in found], dtype=np.float64) for k in range(4))
         starts, ends = starts.astype(np.int64), ends.astype(np.int64)
-        kept = chosen(starts, ends, truth.astype(np.int8), lasting, "longest", 0.3)
+        kept = choose_intervals(starts, ends, truth.astype(np.int8), lasting, "longest", 0.3)
         assert list(zip(starts[kept].tolist(), ends[kept].tolist(), strict=True)) == expected(found, 0.3)
         compared += len(kept)
     assert compared > 500

@@ -14,7 +14,7 @@ from scenicq.forest.walk import leaves
 from scenicq.match.decide.cascade import decide
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
-from scenicq.match.problem.candidates import find_candidates
+from scenicq.match.problem.candidates import prepare_label
 from scenicq.match.problem.evaluation import replay
 from scenicq.match.problem.map_lookups import MapLookups
 from scenicq.match.problem.outcome import Refuted, Satisfied
@@ -70,7 +70,7 @@ def test_a_clear_answer_is_that_of_the_ladder(name):
         for label in labels(scenario, seed):
             for options in OPTIONS:
                 matcher = Matcher(scenario, options)
-                cast = find_candidates(scenario, label, 0, replace(options, radius=None), {})
+                cast = prepare_label(scenario, label, 0, replace(options, radius=None), {})
                 disc = None if options.radius is None else ((label.ego.x, label.ego.y), options.radius)
                 tried = LabelSearch(scenario, options, replace(cast, disc=disc), matcher.ask)
                 for signature, candidates in cast.signatures(matcher.plans.relevant):
@@ -127,7 +127,7 @@ def test_a_label_with_known_candidates_has_the_verdict_that_a_search_finds(name)
             for options in OPTIONS:
                 matcher = Matcher(scenario, options)
                 full = matcher.match(label)
-                cast = find_candidates(scenario, label, 0, options, {})
+                cast = prepare_label(scenario, label, 0, options, {})
                 among = getattr(cast, "candidates", None)
                 if among is None:
                     continue

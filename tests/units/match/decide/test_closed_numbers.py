@@ -12,7 +12,7 @@ from scenes import STREET, compiled, drawn, label_of
 from scenicq.match.decide.cascade import decide
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
-from scenicq.match.problem.candidates import candidates_of, find_candidates
+from scenicq.match.problem.candidates import candidates_of, prepare_label
 from scenicq.match.problem.evaluation import replay
 from scenicq.match.problem.map_lookups import MapLookups
 from scenicq.match.problem.outcome import Refuted, Satisfied
@@ -80,7 +80,7 @@ def test_a_clear_answer_is_that_of_the_cascade(name, options):
     said = {Satisfied: 0, Refuted: 0}
     matcher = Matcher(scenario, options)
     for label in [label for seed in range(6) for label in labels(scenario, seed)]:
-        problem = find_candidates(scenario, label, 0, replace(options, radius=None), {})
+        problem = prepare_label(scenario, label, 0, replace(options, radius=None), {})
         disc = None if options.radius is None else ((label.ego.x, label.ego.y), options.radius)
         search = LabelSearch(scenario, options, replace(problem, disc=disc), matcher.ask)
         for signature, candidates in problem.signatures(matcher.plans.relevant):
@@ -116,7 +116,7 @@ def test_batches_find_what_labels_alone_find(name, options):
         for seed in range(8)
         for label in labels(scenario, seed)
     ]
-    alone = [matcher.match(label, among=among) for label, among in asked]
+    alone = [matcher.match(label, candidates=among) for label, among in asked]
     together = list(matcher.match_all(asked))
     assert [*map(str, together)] == [*map(str, alone)]
     assert {Match, NoMatch} >= {type(verdict) for verdict in together}

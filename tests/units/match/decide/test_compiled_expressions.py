@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from scenicq.forest.nodes import Identity
-from scenicq.match.decide.range_forms import Form, clipped, spread, turned
+from scenicq.match.decide.range_forms import Form, clip, cos_sin, spread
 
 
 def random_form(rng, count, *, unbounded=False):
@@ -70,8 +70,8 @@ def test_forms_are_added_and_multiplied():
 
 def test_columns_are_what_single_values_are():
     angles = np.linspace(-4, 4, 9)
-    assert [np.array(part).tolist() for part in turned(angles)] == [
+    assert [np.array(part).tolist() for part in cos_sin(angles)] == [
         [math.cos(each) for each in angles], [math.sin(each) for each in angles],
     ]  # fmt: skip
-    assert clipped(angles, -1.0, 2.0).tolist() == [clipped(each, -1.0, 2.0) for each in angles.tolist()]
-    assert [clipped(each, -1.0, 2.0) for each in (-3.0, 0.5, 3.0)] == [-1.0, 0.5, 2.0]
+    assert clip(angles, -1.0, 2.0).tolist() == [clip(each, -1.0, 2.0) for each in angles.tolist()]
+    assert [clip(each, -1.0, 2.0) for each in (-3.0, 0.5, 3.0)] == [-1.0, 0.5, 2.0]

@@ -11,7 +11,7 @@ from scenes import compiled, drawn, label_of
 
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
-from scenicq.match.problem.candidates import find_candidates
+from scenicq.match.problem.candidates import prepare_label
 from scenicq.match.problem.constraints import relevant_properties
 from scenicq.match.search.arc_consistency import arc_consistent
 from scenicq.match.tolerance import EXACT, Tolerance
@@ -26,7 +26,7 @@ def test_thinning_never_removes_a_right_candidate(name):
     removed = 0
     for seed in range(8):
         label = label_of(scenario, drawn(scenario, seed), random.Random(seed), distractors=4)
-        cast = find_candidates(scenario, label, 0, matcher.options, {})
+        cast = prepare_label(scenario, label, 0, matcher.options, {})
         ((signature, candidates),) = cast.signatures(relevant_properties(scenario, matcher.options))
         wanted = {index: numbers for index, numbers in candidates.items() if index != scenario.ego}
         left, failed = arc_consistent(matcher.plans.plan(signature), wanted, cast, scenario.ego, Tolerance())
@@ -48,7 +48,7 @@ def test_thinning_looks_along_the_ego():
     on, off = replace(car, id="on", x=11.75, y=60.0), replace(car, id="off", x=14.75, y=53.0)
     third = replace(car, id="third", x=20.0, y=60.0, heading=0.0)
     label = Label("frame", "recording", 0, "street", car, (on, off, third))
-    cast = find_candidates(scenario, label, 0, matcher.options, {})
+    cast = prepare_label(scenario, label, 0, matcher.options, {})
     ((signature, candidates),) = cast.signatures(relevant_properties(scenario, matcher.options))
     wanted = {index: numbers for index, numbers in candidates.items() if index != scenario.ego}
     left, _ = arc_consistent(matcher.plans.plan(signature), wanted, cast, scenario.ego, Tolerance())

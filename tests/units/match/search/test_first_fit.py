@@ -57,11 +57,11 @@ def test_a_search_finds_the_same(name, radius, monkeypatch):
             given = {scenario.objects[-1].name: each.objects[0].id} if each.objects and seed % 2 else {}
             with monkeypatch.context() as patched:
                 patched.setattr(FirstFit, "fill", counted)
-                found = matcher.match(each, given=given)
+                found = matcher.match(each, fixed_roles=given)
             with monkeypatch.context() as patched:
                 patched.setattr(FirstFit, "fill", lambda *_: iter(()))
-                assert found == matcher.match(each, given=given)
-            assert found == matcher.match(each, SilentReporter(), given=given)
+                assert found == matcher.match(each, fixed_roles=given)
+            assert found == matcher.match(each, SilentReporter(), fixed_roles=given)
             matched += isinstance(found, Match)
         if name in BY_THEMSELVES and radius is None:
             with monkeypatch.context() as patched:

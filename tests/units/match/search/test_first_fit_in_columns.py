@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from programs import HEADER, PROGRAMS
 from scenes import STREET, compiled, drawn, label_of
 
-from scenicq.garbage import without_collector
-from scenicq.match.decide.range_forms import clipped, turned
+from scenicq.garbage import pause_collector
+from scenicq.match.decide.range_forms import clip, cos_sin
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import candidates_of
@@ -95,7 +95,7 @@ def test_the_same_is_found_together(name, options):
     scenario = compiled(HEADER + CASES[name], STREET)
     matcher = Matcher(scenario, options)
     asked = with_candidates(matcher.scenario, options, labels(scenario, range(4)))
-    alone = [matcher.match(label, among=among) for label, among in asked]
+    alone = [matcher.match(label, candidates=among) for label, among in asked]
     together = list(matcher.match_all(asked))
     assert together == alone
     assert list(map(str, together)) == list(map(str, alone))
@@ -104,7 +104,7 @@ def test_the_same_is_found_together(name, options):
     brief = list(matcher.match_all(asked, details=False))
     assert [_in_brief(each) for each in brief] == [_in_brief(each) for each in alone]
     # a search by itself comes as far as first fit
-    searched = [next(matcher.findings(label, among=among)).verdict for label, among in asked]
+    searched = [next(matcher.findings(label, candidates=among)).verdict for label, among in asked]
     assert [_in_brief(each) for each in searched if isinstance(each, NoMatch)] == [
         _in_brief(each) for each in alone if isinstance(each, NoMatch)
     ]
@@ -125,7 +125,7 @@ def test_what_surely_does_not_match_is_not_searched_one_by_one(name, monkeypatch
         away = tuple(replace(each, x=each.x + 500.0) for each in label.objects)
         found.append(replace(label, objects=(*away, *(replace(each, id=f"{each.id}-too") for each in away))))
     asked = with_candidates(matcher.scenario, options, [each for each in found if each.objects])
-    told = [_in_brief(matcher.match(label, among=among)) for label, among in asked]
+    told = [_in_brief(matcher.match(label, candidates=among)) for label, among in asked]
     alone = []
     monkeypatch.setattr(Matcher, "_findings", lambda *args: alone.append(args))
     for details in (False, True):
@@ -157,7 +157,7 @@ def test_labels_are_let_go_without_the_collector(name):
     matcher = Matcher(scenario, MatchOptions())
     asked = with_candidates(matcher.scenario, MatchOptions(), labels(scenario, range(4)))
     gc.collect()
-    with without_collector():
+    with pause_collector():
         assert list(matcher.match_all(asked))
         assert not [each for each in gc.get_objects() if isinstance(each, LabelRow)]
 
@@ -169,11 +169,11 @@ numbers = st.floats(allow_nan=False, allow_infinity=False, width=64)
 @given(st.lists(st.tuples(numbers, numbers, numbers), min_size=1, max_size=20))
 def test_columns_are_what_numbers_are(rows):
     values, lows, highs = (np.array(each) for each in zip(*rows, strict=True))
-    one_by_one = [clipped(*row) for row in rows]
-    together = clipped(values, lows, highs).tolist()
+    one_by_one = [clip(*row) for row in rows]
+    together = clip(values, lows, highs).tolist()
     assert list(map(repr, together)) == list(map(repr, one_by_one))
-    cosines, sines = turned(values)
-    assert [*zip(cosines.tolist(), sines.tolist(), strict=True)] == [turned(float(value)) for value in values]
+    cosines, sines = cos_sin(values)
+    assert [*zip(cosines.tolist(), sines.tolist(), strict=True)] == [cos_sin(float(value)) for value in values]
     assert math.cos(rows[0][0]) == cosines[0]
 
 

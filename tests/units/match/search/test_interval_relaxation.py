@@ -20,7 +20,7 @@ from scenicq.geometry.angles import distance
 from scenicq.geometry.default_street import street
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.constraints import build_groups, relevant_properties
-from scenicq.match.problem.preprocess import ready
+from scenicq.match.problem.preprocess import prepare_scenario
 from scenicq.match.search.interval_relaxation import Relaxation, within_margin
 from scenicq.match.tolerance import SLACK, Margin
 
@@ -62,7 +62,7 @@ def test_a_point_is_near_a_box_where_it_is_within_reach_of_it_along_both_axes(le
 def test_bounds_that_no_label_changes_are_found_once():
     """A look-up among many lanes costs a label no step for each of them."""
     text = "model scenic.domains.driving.model\nego = new Car on road\nnew Car on ego.lane, facing Range(-9, 9) deg\n"
-    scenario = ready(compile_scenario(Source("p.scenic", text), street()))
+    scenario = prepare_scenario(compile_scenario(Source("p.scenic", text), street()))
     groups = build_groups(scenario, tuple(relevant_properties(scenario, MatchOptions())), MatchOptions())
     relaxations = [Relaxation.of(group) for group in groups]
     assert any(len(each.given) > 3 for each in relaxations)

@@ -23,7 +23,7 @@ def dataset(program_scenes) -> Dataset:
 @pytest.mark.parametrize("jobs", [1, 2, pytest.param(None, marks=pytest.mark.slow)])
 @pytest.mark.one_in(2)
 def test_small_blocks_and_processes_give_the_same(dataset, jobs, monkeypatch):
-    monkeypatch.setattr("scenicq.query.execution.block_executor.as_many_as_pay", lambda: 2)
+    monkeypatch.setattr("scenicq.query.execution.block_executor.default_processes", lambda: 2)
     monkeypatch.setattr("scenicq.query.execution.block_executor._PAYS_S", 0.0)
     monkeypatch.setattr("scenicq.query.prefilter.executor._FEWEST_FRAMES", 20)
     monkeypatch.setattr("scenicq.query.prefilter.executor._MOST_FRAMES", 40)
@@ -42,7 +42,7 @@ def test_small_blocks_and_processes_give_the_same(dataset, jobs, monkeypatch):
 @pytest.mark.slow
 def test_processes_are_started_once_it_is_clear_that_it_takes_long(dataset, pays, monkeypatch):
     monkeypatch.setattr("scenicq.query.prefilter.executor._FEWEST_FRAMES", 20)
-    monkeypatch.setattr("scenicq.query.execution.block_executor.as_many_as_pay", lambda: 2)
+    monkeypatch.setattr("scenicq.query.execution.block_executor.default_processes", lambda: 2)
     monkeypatch.setattr("scenicq.query.execution.block_executor._PAYS_S", 0.0 if pays else 3600.0)
     query = Query(dataset, Source("test.scenic", HEADER + TIED["near another"]), QueryOptions(every=True, jobs=None))
     processes = []

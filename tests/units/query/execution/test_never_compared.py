@@ -150,7 +150,7 @@ def test_a_heading_along_lanes_that_the_map_has_not_is_told(dataset, run, tmp_pa
     assert done.exit_code == 2
     assert "error[map-lacks]: the map `town` has no lane that `roadDirection` could be the direction of" in done.stderr
     assert "the default heading of `Car` needs lanes" in done.stderr
-    assert "`facing Range(0, 360) deg` asks nothing of the map" in done.stderr
+    assert "`facing Range(0, 360) deg` needs nothing from the map" in done.stderr
     file.write_text(file.read_text().replace("0 @ 5", "0 @ 5, facing Range(0, 360) deg"))
     assert run("match", file, dataset.folder, "--exit-zero").exit_code == 0
 

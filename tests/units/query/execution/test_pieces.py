@@ -11,7 +11,7 @@ from scenicq.errors import DataError
 from scenicq.importers.ingest import ingest
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import EXACT, parse_tolerance
-from scenicq.query.execution.executors import here, resumed
+from scenicq.query.execution.executors import resumable, run_here
 from scenicq.query.execution.pieces import DatasetPiece, find_finished, fingerprint, gather, partitions, write_piece
 from scenicq.query.execution.program_files import read_program
 from scenicq.query.execution.records import FrameRecord, record
@@ -125,7 +125,7 @@ def test_pieces_of_a_program_whose_imports_have_changed_are_made_anew(dataset, t
         helper.write_text(f"far = {far}\n")
         query = Query(dataset, read_program(program), OPTIONS)
         pieces = partitions(dataset, 2)
-        done = resumed(tmp_path / "pieces", here)(query, pieces, lambda _: None)
+        done = resumable(tmp_path / "pieces", run_here)(query, pieces, lambda _: None)
         found[far] = {result.frame for _, (results, _) in done for result in results}
     assert not found[-10_000]
     assert len(found[10_000]) > 3

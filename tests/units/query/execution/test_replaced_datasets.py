@@ -16,7 +16,7 @@ import pytest
 from scenicq.errors import DataError
 from scenicq.importers.ingest import ingest
 from scenicq.match.options import MatchOptions
-from scenicq.query.execution.executors import Executor, in_order, on_this_machine, usual_pieces
+from scenicq.query.execution.executors import Executor, local_executor, ordered_results, usual_pieces
 from scenicq.query.execution.program_files import read_program
 from scenicq.query.execution.records import record
 from scenicq.query.execution.results import Result
@@ -55,7 +55,7 @@ def by_blocks(query: Query) -> Iterator[Result]:
 
 
 def by_shards(query: Query) -> Iterator[Result]:
-    return in_order(query, on_this_machine(query), usual_pieces(query, 3), lambda _: None)
+    return ordered_results(query, local_executor(query), usual_pieces(query, 3), lambda _: None)
 
 
 def by_dask(query: Query) -> Iterator[Result]:
@@ -63,7 +63,7 @@ def by_dask(query: Query) -> Iterator[Result]:
     from scenicq.query.execution.dask_executor import dask
 
     engine: Executor = dask()
-    return in_order(query, engine, usual_pieces(query, 3), lambda _: None)
+    return ordered_results(query, engine, usual_pieces(query, 3), lambda _: None)
 
 
 @pytest.fixture

@@ -25,7 +25,7 @@ import scenicq
 from scenicq import budget
 from scenicq.errors import DataError, Source
 from scenicq.importers.ingest import ingest
-from scenicq.query.execution.executors import here, in_order, resumed, usual_pieces
+from scenicq.query.execution.executors import ordered_results, resumable, run_here, usual_pieces
 from scenicq.query.execution.option_texts import DRIVING, read_options
 from scenicq.query.execution.records import record
 from scenicq.query.execution.result_files import read_records, read_results
@@ -100,7 +100,9 @@ def test_what_a_deadline_skips_is_what_all_does_not_name(
     def run(until: float) -> tuple[set[str], ResultSummary]:
         options = replace(read_options(every=True, prefilter=False, model=DRIVING), until=until)
         query = Query(town, Source("p", program), options)
-        results = in_order(query, here, usual_pieces(query, 9), lambda _: None) if engine else query.results()
+        results = (
+            ordered_results(query, run_here, usual_pieces(query, 9), lambda _: None) if engine else query.results()
+        )
         found, summary = taken(query, results)
         return {each.recording if each.interval else each.frame for each in found}, summary
 
@@ -370,7 +372,7 @@ def test_pieces_of_a_limited_query_are_cut_where_one_is(town: Dataset, tmp_path:
 
     query = Query(town, Source("p", PLAIN), read_options(limit=20, every=True, model=DRIVING))
     pieces = usual_pieces(query, 2)
-    engine = resumed(tmp_path, here)
+    engine = resumable(tmp_path, run_here)
     for _ in engine(query, pieces, lambda _: None):
         pass
     gathered = gather(tmp_path)

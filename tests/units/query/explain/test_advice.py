@@ -275,7 +275,7 @@ def test_frames_on_maps_that_lack_what_is_needed_are_in_no_number(tmp_path):
     without = TEXT.replace("require (distance to walker) < 2\n", "")
     assert told["without `require (distance to walker) < 2`"] == taken(dataset, without).funnel.matches > 0
     (warning,) = query.funnel.warnings
-    assert warning.message.startswith(f"{elsewhere} frames on 2 maps (`elsewhere`, `nowhere`) cannot match; of `else")
+    assert warning.message.startswith(f"{elsewhere} frames on 2 maps (`elsewhere`, `nowhere`) cannot match; on `else")
 
 
 CLASSES = ("Car", "Bus", "Pedestrian", "Vehicle")

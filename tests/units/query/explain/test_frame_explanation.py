@@ -9,14 +9,15 @@ import pytest
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import Source
 from scenicq.geometry.default_street import street
+from scenicq.limits import Beyond, Limits
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.evaluation import show_value
 from scenicq.match.tolerance import EXACT, Tolerance, parse_tolerance
-from scenicq.match.verdict import Match, NoMatch
+from scenicq.match.verdict import Match, NoMatch, Unknown
 from scenicq.query.explain.changes import show_tolerance
-from scenicq.query.explain.frame_explanation import explain, show_explanation
-from scenicq.query.explain.nearest_miss import closest, separated, widened
+from scenicq.query.explain.frame_explanation import REASONS, explain, show_explanation
+from scenicq.query.explain.nearest_miss import closest, narrow_advice, widen_tolerance
 from scenicq.store.labels import Label, LabelObject
 
 STREET = street()
@@ -87,6 +88,25 @@ def test_a_requirement_shows_both_sides_and_no_tolerance_helps():
     assert "no tolerance would make it match" in show_explanation(found)
 
 
+def test_what_a_label_does_not_tell_is_undecided_and_not_excluded():
+    found = explain(matcher(TEXT + "require other.speed > 1\n"), frame(car("a", 1.75, 60.0)))
+    assert isinstance(found.verdict, Unknown)
+    (violation,) = found.violations
+    assert violation.reason == found.verdict.reason == "unobserved"
+    text = show_explanation(found)
+    assert text.startswith("frame f1 is undecided: unobserved\n")
+    assert "undecided[frame-undecided]: " in text
+    assert "is not decided: the label does not tell what the program asks" in text
+    assert "other.speed is not observed" in text
+    assert "excluded" not in text
+
+
+def test_each_reason_of_a_limit_is_said_in_words():
+    limits = Limits.__dataclass_fields__.values()
+    reasons = {each.metadata["more"] for each in limits if each.metadata["beyond"] is Beyond.UNDECIDED}
+    assert {each for each in reasons if " " not in each} <= REASONS.keys()
+
+
 def test_a_missing_class_is_said():
     found = explain(matcher(), frame())
     assert found.violations[0].what == "other.class"
@@ -104,7 +124,7 @@ def test_formulas_are_smtlib_with_their_verdicts():
 @pytest.mark.parametrize("widening", [0.0, 0.3, 2.0, 50.0])
 @pytest.mark.parametrize("base", [Tolerance(), Tolerance(x=0.2, y=0.3, heading=0.1)])
 def test_widening_is_monotone_in_every_part(widening, base):
-    small, large = widened(base, widening), widened(base, widening + 0.1)
+    small, large = widen_tolerance(base, widening), widen_tolerance(base, widening + 0.1)
     assert large.position > small.position >= base.position
     assert large.other > small.other
     assert math.pi >= large.heading >= small.heading >= base.heading
@@ -123,7 +143,7 @@ def test_the_smallest_tolerance_is_smallest_and_is_enough(x, heading):
     wanted = max(abs(x - 1.75), turned) - 1e-3
     assert found.widening_m == pytest.approx(wanted, rel=0.02, abs=4e-3)
     assert isinstance(matcher(tolerance=found.tolerance).match(label), Match)
-    too_small = widened(EXACT, 0.95 * wanted - 2e-3)
+    too_small = widen_tolerance(EXACT, 0.95 * wanted - 2e-3)
     assert isinstance(matcher(tolerance=too_small).match(label), NoMatch)
 
 
@@ -145,7 +165,7 @@ def test_what_matches_needs_no_wider_tolerance():
 
 def advised(label, text=TEXT, **options):
     mine = matcher(text, **options)
-    return separated(mine, label, closest(mine, label))
+    return narrow_advice(mine, label, closest(mine, label))
 
 
 def test_a_part_that_is_enough_alone_is_advised_alone():

@@ -22,7 +22,7 @@ from scenicq.geometry.abstract_map import AbstractNetwork
 from scenicq.geometry.regions import PolygonSet
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
-from scenicq.match.problem.preprocess import ready
+from scenicq.match.problem.preprocess import prepare_scenario
 from scenicq.match.tolerance import EXACT, parse_tolerance
 from scenicq.match.verdict import Match, NoMatch
 from scenicq.query.execution import run
@@ -153,7 +153,7 @@ def check(dataset: Dataset, seed: int) -> int:
     draw = random.Random(seed)
     text, options = question(draw), MatchOptions(tolerance=draw.choice(TOLERANCES), timeout_s=5.0)
     try:
-        scenario = ready(compile_scenario(Source("p.scenic", text), STREET))
+        scenario = prepare_scenario(compile_scenario(Source("p.scenic", text), STREET))
     except ScenarioError:
         return 0
     matcher = Matcher(scenario, options)
@@ -200,7 +200,7 @@ def test_something_may_be_meant_where_nothing_lies():
 @pytest.mark.slow
 def test_the_same_element_may_be_none(dataset: Dataset, kind: str, said: str):
     text = f"{HEAD}other = new Car {ANY}\nrequire {said.format(kind)}\n"
-    scenario = ready(compile_scenario(Source("p.scenic", text), STREET))
+    scenario = prepare_scenario(compile_scenario(Source("p.scenic", text), STREET))
     matcher = Matcher(scenario, MatchOptions())
     right = {each.frame for each in dataset.labels() if isinstance(matcher.match(each), Match)}
     for proofs in (False, True):
@@ -219,7 +219,7 @@ def test_the_same_element_may_be_none(dataset: Dataset, kind: str, said: str):
 @pytest.mark.one_in(4)
 def test_one_of_the_elements_at_a_place_is_meant_throughout(dataset: Dataset, said: str):
     """Plain evaluation, for each of them."""
-    scenario = ready(compile_scenario(Source("p.scenic", f"{HEAD}require {said}\n"), STREET))
+    scenario = prepare_scenario(compile_scenario(Source("p.scenic", f"{HEAD}require {said}\n"), STREET))
     conditions = tuple(each.condition for each in scenario.requirements if each.built_in is None)
     chosen = {leaf.identity: len(leaf.weights) for leaf in leaves(*conditions) if isinstance(leaf, Index)}
     matcher, several = Matcher(scenario, MatchOptions()), 0

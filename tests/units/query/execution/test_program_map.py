@@ -13,9 +13,9 @@ from scenicq.compiler.named_map import named_map
 from scenicq.errors import DataError, ScenarioError, Source
 from scenicq.importers.ingest import ingest
 from scenicq.match.verdict import NoMatch
-from scenicq.query.execution.compiled_map import program_network, read_network
-from scenicq.query.execution.executors import here, in_order
+from scenicq.query.execution.executors import ordered_results, run_here
 from scenicq.query.execution.pieces import partitions
+from scenicq.query.execution.program_map import program_network, read_network
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.dataset import open_dataset
 
@@ -134,6 +134,6 @@ def test_frames_of_a_map_that_lacks_something_have_their_rows(tmp_path: Path, pr
     assert query.funnel.excluded["map bare"] == len(on_bare)
     assert all("nothing for `crossing`" in str(result.verdict) for result in told)
     again = Query(dataset, program, query.options)
-    assert list(in_order(again, here, partitions(dataset, 3), reached.append)) == results
+    assert list(ordered_results(again, run_here, partitions(dataset, 3), reached.append)) == results
     few = Query(dataset, program, replace(query.options, every=False))
     assert not any(result.frame in on_bare for result in few.results())

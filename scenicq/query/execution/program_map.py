@@ -1,7 +1,8 @@
-"""Maps that are no dataset's: given by the user, or named by a program.
+"""The map of a program: read where there is no dataset, and what the author is told about it where there is one.
 
-A query uses the dataset's maps, on which the labels lie, whatever map the program names. Where there is no dataset, the
-map that the program names is used.
+A query uses the dataset's maps, on which the labels lie, whatever map the program names; then the remarks here say that
+the program's map is not used, or what the dataset's maps lack. Without a dataset, the map is the one that the user
+gives or that the program names.
 """
 
 from __future__ import annotations
@@ -34,11 +35,11 @@ _HINT = "`--map FILE` gives a map to use instead"
 
 
 def read_network(file: Path, cache: Path) -> Network:
-    """The road network of a GeoJSON or OpenDRIVE map, called like the file.
+    """Read the road network of a GeoJSON or OpenDRIVE map, which is called like the file.
 
     Args:
         file: The map.
-        cache: Folder that keeps what Scenic's parser makes of OpenDRIVE maps.
+        cache: Folder that keeps OpenDRIVE maps as Scenic's parser has converted them.
 
     Raises:
         DataError: The map cannot be read; see `scenicq.importers.opendrive.convert_xodr`.
@@ -53,12 +54,12 @@ def read_network(file: Path, cache: Path) -> Network:
 
 
 def program_network(source: Source, folder: Path, version: int | None, cache: Path) -> Network | None:
-    """The road network of the map that a program names; None where it names none.
+    """Read the road network of the map that a program names; None where it names none.
 
     Args:
         source: The program.
-        folder: Of the program; nothing outside of it is read.
-        version: Of Scenic; inferred if None.
+        folder: Folder of the program; nothing outside of it is read.
+        version: Version of Scenic; inferred if None.
         cache: See `read_network`.
 
     Raises:
@@ -69,7 +70,7 @@ def program_network(source: Source, folder: Path, version: int | None, cache: Pa
     if named is None:
         return None
     try:
-        return read_network(_inside(named, folder), cache)
+        return read_network(_find_map_file(named, folder), cache)
     except DataError as error:
         told = [
             each if each.span else replace(each, span=named.span, label="named here", hints=(*each.hints, _HINT))
@@ -78,7 +79,8 @@ def program_network(source: Source, folder: Path, version: int | None, cache: Pa
         raise DataError(told) from error
 
 
-def _inside(named: NamedMap, folder: Path) -> Path:
+def _find_map_file(named: NamedMap, folder: Path) -> Path:
+    """The file of a map that a program names; it must lie in the program's folder, and be a map by its name."""
     try:
         file = (folder / named.file).resolve()
         there = file.is_file()
@@ -96,9 +98,9 @@ def _inside(named: NamedMap, folder: Path) -> Path:
 
 
 def is_about_map(error: ScenarioError) -> bool:
-    """Whether an error may be one of the map alone: a program that it fits has what this one lacks.
+    """Whether an error may be due to the map alone, so that the program may be sound on another map.
 
-    Lists of elements are empty there, and requirements fail that hold of elements elsewhere.
+    On a map without some elements, lists of these are empty, and requirements on them fail.
     """
     return {each.code for each in error.diagnostics} <= _OF_MAPS
 
@@ -107,7 +109,7 @@ _OF_MAPS = frozenset({"map-lacks", "runtime-error", "impossible-requirement"})
 
 
 def about_dataset(error: ScenarioError, dataset: Dataset, map_name: str) -> ScenarioError:
-    """The error with the dataset in it, where a map lacks what the program needs; any other as it is."""
+    """Name the dataset in an error that says that its map lacks something; other errors stay as they are."""
     absent = not dataset.network(map_name).kinds
     told: list[Diagnostic] = []
     for each in error.diagnostics:
@@ -128,11 +130,11 @@ def about_dataset(error: ScenarioError, dataset: Dataset, map_name: str) -> Scen
 
 
 def misfit_remarks(lacking: Mapping[str, Diagnostic], manifest: Manifest) -> Iterator[Diagnostic]:
-    """Warnings of maps on which no frame can match; those that lack the same are spoken of together.
+    """Warn of maps on which no frame can match; one warning for maps that lack the same.
 
     Args:
-        lacking: What each of them lacks, by name.
-        manifest: Of the dataset; maps without frames are passed over.
+        lacking: What each map lacks, by its name.
+        manifest: Manifest of the dataset; maps without frames are passed over.
     """
     frames = {name: counts.frames for name, counts in manifest.by_map.items()}
     grouped: dict[str, list[str]] = {}
@@ -147,13 +149,13 @@ def misfit_remarks(lacking: Mapping[str, Diagnostic], manifest: Manifest) -> Ite
             f"{count} frames on map {shown} cannot match: {told.message}"
             if len(alike) == 1
             else f"{count} frames on {len(alike)} maps ({shown}{', ...' if len(alike) > _NAMED_MAPS else ''}) "
-            f"cannot match; of `{alike[0]}`: {told.message}"
+            f"cannot match; on `{alike[0]}`: {told.message}"
         )
         yield replace(told, code="map-lacks", message=message, severity="warning")
 
 
 def map_remark(source: Source, version: int | None, dataset: Dataset) -> Diagnostic | None:
-    """A warning where a program names a map that the dataset does not have; None where all is well."""
+    """Warn that a program names a map which the dataset does not have; None if it has it or none is named."""
     named = named_map(source, version)
     if named is None:
         return None
@@ -168,7 +170,7 @@ def map_remark(source: Source, version: int | None, dataset: Dataset) -> Diagnos
 
 
 def program_remarks(scenario: Scenario) -> list[Diagnostic]:
-    """What the author should know: parts that say nothing about whether a label matches.
+    """Warn of the parts of a program that make no difference to whether a label matches.
 
     Args:
         scenario: The scenario.
