@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Any, Unpack, cast
 
 import msgspec
 
@@ -237,8 +237,7 @@ class Matches(Sequence[FrameResult]):
 
     def __getitem__(self, which: Any) -> Any:
         """A result by its number, several by a slice."""
-        found: Any = self._all()[which]
-        return found
+        return cast("Any", self._all())[which]
 
     def select(self, *, where: str | None = None, sort: str | None = None) -> Matches:
         """Some of the matches, or all in another order, by what the program records; nothing is matched again.

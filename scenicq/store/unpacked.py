@@ -128,7 +128,7 @@ def decoded_bytes(array: pa.Array, record: int = 0) -> int:
         elif kinds.is_list(kind) or kinds.is_large_list(kind) or kinds.is_fixed_size_list(kind):
             stack.append(each.flatten())
         elif str(kind) in ("string_view", "binary_view"):
-            views = np.frombuffer(each.buffers()[1] or b"", np.int32).reshape(-1, 4)
+            views = np.frombuffer(memoryview(each.buffers()[1] or b""), np.int32).reshape(-1, 4)
             total += int(views[each.offset : each.offset + len(each), 0].astype(np.int64).sum())
         elif str(kind).startswith(("run_end_encoded", "list_view", "large_list_view")):
             raise pa.ArrowNotImplementedError(f"columns of type {kind} are not read")
