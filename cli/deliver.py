@@ -20,8 +20,8 @@ from scenicq.query.execution.result_summary import ResultCount, ResultSummary
 from scenicq.query.execution.results import Funnel, Result
 from scenicq.query.execution.run import Query
 from scenicq.query.execution.skipped_frames import summarize
-from scenicq.store.atomic_files import sole_writer
 from scenicq.store.remote_path import AnyPath
+from scenicq.store.targets import target_of
 
 from .formats import make_writer
 from .main import NOTHING, UNDECIDED
@@ -71,7 +71,7 @@ def deliver(
     from scenicq.report.write import check_target  # noqa: PLC0415 - takes long to load
 
     check_target(wanted.report)
-    with sole_writer(wanted.report):
+    with target_of(wanted.report).sole_writer():
         return _deliver(query, results, near, wanted, bar)
 
 

@@ -1,9 +1,5 @@
 """`scenicq evaluate`: a model's detections on the frames of a scenario, against other frames."""
 
-# pyarrow has no type stubs.
-# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
-# pyright: reportUnknownArgumentType=false
-
 from __future__ import annotations
 
 import io
@@ -32,9 +28,9 @@ from scenicq.evaluate.rows import (
 from scenicq.query.execution.option_texts import read_options
 from scenicq.query.execution.run import Query
 from scenicq.report.write import check_target
-from scenicq.store.atomic_files import check_writable
 from scenicq.store.dataset import Dataset
 from scenicq.store.remote_path import AnyPath
+from scenicq.store.targets import target_of
 
 from .datasets import open_checked
 from .formats import CsvRows
@@ -105,7 +101,7 @@ def evaluate(results: tuple[AnyPath, ...], dataset: str, *, predictions: tuple[P
     if report is not None:
         check_target(report)
     if file is not None:
-        check_writable(file)
+        target_of(file).check_writable()
     opened = open_checked(dataset)
     found = judge(
         {name: _asked(each, opened) for name, each in zip(names, results, strict=True)},

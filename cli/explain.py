@@ -16,8 +16,9 @@ from scenicq.query.explain.frame_explanation import explain as explain_label
 from scenicq.query.explain.frame_explanation import show_explanation
 from scenicq.query.explain.interval_explanation import explain_beginning, explain_recording
 from scenicq.query.explain.moments import named_frame, named_moment
-from scenicq.store.atomic_files import made_folder, write_whole
+from scenicq.store.atomic_files import write_whole
 from scenicq.store.remote_path import AnyPath
+from scenicq.store.targets import target_of
 
 from .datasets import open_checked
 from .main import NOTHING, UNDECIDED
@@ -93,7 +94,7 @@ def explain(
     say(printable(told))
     if smt2 is not None:
         try:
-            with made_folder(smt2):
+            with target_of(smt2).made_folder():
                 for formula in explanation.formulas:
                     write_whole(smt2 / f"{formula.name}.smt2", formula.text)
         except OSError as error:

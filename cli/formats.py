@@ -1,9 +1,5 @@
 """The formats of results: each writer takes results one by one and writes what it can at once."""
 
-# pyarrow has no type stubs.
-# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
-# pyright: reportUnknownArgumentType=false
-
 from __future__ import annotations
 
 import csv

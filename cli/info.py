@@ -218,7 +218,7 @@ def info(dataset: str, *, verify: bool, named: bool, format_: str) -> None:
     if verify:
         with opened.blamed():
             opened.verify()
-            check_dataset(opened)
+            check_dataset(opened.place, opened.manifest)
             verify_computed(opened)
     if format_ == "json":
         say(printable_json(opened.manifest.to_json()), nl=False)

@@ -13,9 +13,10 @@ from scenicq.errors import DataError, Diagnostic
 from scenicq.importers.ingest import IngestSummary
 from scenicq.importers.ingest import ingest as make_dataset
 from scenicq.option_values import Count
-from scenicq.store.atomic_files import check_writable, is_taken, whole_folder
+from scenicq.store.atomic_files import whole_folder
 from scenicq.store.manifest import MANIFEST, LeftOut
 from scenicq.store.remote_path import AnyPath, RemotePath
+from scenicq.store.targets import target_of
 
 from .manual import Manual
 from .option_type import OptionType
@@ -56,10 +57,10 @@ def _check_new(dataset: RemotePath, *, force: bool, update: bool) -> None:
         message = f"{dataset} lies elsewhere, where a dataset is made new, and neither replaced nor updated"
         hint = "update it on this machine, and copy it there, `dataset.json` last"
         raise DataError(Diagnostic("option-invalid", message, hints=(hint,)))
-    if is_taken(dataset):
+    if target_of(dataset).is_taken():
         hint = "choose another name: nothing elsewhere is replaced"
         raise DataError(Diagnostic("target-exists", f"{dataset} exists", hints=(hint,)))
-    check_writable(dataset)
+    target_of(dataset).check_writable()
 
 
 @contextlib.contextmanager

@@ -23,8 +23,8 @@ from scenicq.query.execution.option_texts import QUERY_OPTIONS
 from scenicq.query.execution.result_summary import ResultSummary
 from scenicq.query.execution.results import Result, Sample
 from scenicq.query.execution.run import Query
-from scenicq.store.atomic_files import remove_folder, sole_writer
 from scenicq.store.remote_path import AnyPath
+from scenicq.store.targets import target_of
 
 from .advise import advise, is_nearly_empty
 from .combinations import check_combination, check_over_time
@@ -204,7 +204,7 @@ def match(ctx: click.Context, scenario: str | None, dataset: str | None, *, prog
     if summarized:
         results = matching.gathered(results)
     came_close: list[str] = []
-    with contextlib.nullcontext() if pieces is None else sole_writer(pieces):
+    with contextlib.nullcontext() if pieces is None else target_of(pieces).sole_writer():
         try:
             said = deliver(query, results, _noted(_near(query, near), came_close), wanted, bar)
         except BaseException:
@@ -213,7 +213,7 @@ def match(ctx: click.Context, scenario: str | None, dataset: str | None, *, prog
                     pieces.rmdir()  # if nothing is done yet
             raise
         if pieces is not None and not query.funnel.cut:
-            remove_folder(pieces)
+            target_of(pieces).remove_folder()
     INTERRUPTS.advice = "  = hint: all results are written"
     if query.funnel.cut:
         _tell_cut(query, resume=resume)

@@ -11,8 +11,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO, NoReturn, Self
 
 from scenicq.errors import DataError, Diagnostic
-from scenicq.store.atomic_files import WholeFile, check_writable, whole_file
+from scenicq.store.atomic_files import WholeFile, whole_file
 from scenicq.store.remote_path import AnyPath, RemotePath
+from scenicq.store.targets import target_of
 
 from .streams import results
 
@@ -74,7 +75,7 @@ def destination(file: AnyPath | None, folder: AnyPath | None = None) -> Generato
     if file is None:
         yield results().buffer
     elif isinstance(file, RemotePath):
-        check_writable(file)
+        target_of(file).check_writable()
         with whole_file(file) as sink:
             yield sink
     elif file.exists() and not file.is_file() and not file.is_dir():

@@ -14,8 +14,8 @@ from scenicq.query.execution.result_origin import name_origin
 from scenicq.query.execution.result_summary import ResultSummary
 from scenicq.query.execution.results import Funnel
 from scenicq.query.execution.run import Query
-from scenicq.store.atomic_files import check_writable
 from scenicq.store.remote_path import AnyPath
+from scenicq.store.targets import target_of
 
 from .output import ProgressBar
 
@@ -65,7 +65,7 @@ def run_shard(query: Query, shard: Shard, folder: AnyPath, *, quiet: bool) -> tu
         return Funnel(), None  # fewer recordings than shards: nothing is left for this one
     piece = pieces[number - 1]
     if not find_finished(folder, question, [piece]):
-        check_writable(folder)
+        target_of(folder).check_writable()
         query.recordings = piece.recordings
         with ProgressBar(piece.frames, quiet=quiet) as bar:
             write_piece(folder, question, piece, _whole(query, shard, folder, bar), query)

@@ -83,6 +83,7 @@ CODES: dict[str, str] = {
     "resources-exhausted": "the system gives no more memory, files or processes",
     "deadline-passed": "time ran out before all frames were decided, or before a scene was drawn",
     "results-incomplete": "results leave some frames out, or do not say whether they do",
+    "results-version": "results were written by a newer version",
     "ranking-cut": "a ranking has not looked at every frame that may be among the closest",
     "predictions-invalid": "a predicted box has a value that makes no sense",
     "predictions-doubtful": "predictions look like placeholders, or the benchmark's own evaluation refuses them",

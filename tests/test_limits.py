@@ -23,6 +23,7 @@ NO_LIMITS = {
     "forest/improvise.py": "_PATIENCE: when regions are cut, which takes none away",
     "forest/step_counts.py": "FEWEST, LONGEST: Scenic's steps",
     "geometry/direction_surroundings.py": "_LARGEST: a size of squares",
+    "geometry/driven_courses.py": "_FEW: pairs that are looked at without a search tree",
     "match/decide/decomposition.py": "_FEW_OPTIONS: which of two ways comes first",
     "match/fields/witness_search.py": "_FEW: draws of a search that has nowhere to go",
     "query/execution/result_files.py": "_LONGEST: what a cell of a file may be",

@@ -1,9 +1,5 @@
 """The labels of a dataset as columns: frames, and the label objects in them."""
 
-# duckdb and pyarrow have no complete type stubs.
-# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
-# pyright: reportUnknownArgumentType=false
-
 from __future__ import annotations
 
 import json
@@ -17,7 +13,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from scenicq.store.dataset import Dataset
-from scenicq.store.schema import ArrowArray
+from scenicq.store.schema import ArrowArray, ArrowTable
 
 __all__ = ["Annotations", "Frames", "read_annotations"]
 
@@ -147,7 +143,7 @@ def read_annotations(
     return frames, annotations
 
 
-def _annotations(objects: Any, points: tuple[str, ...], groups: tuple[str, ...]) -> Annotations:
+def _annotations(objects: ArrowTable, points: tuple[str, ...], groups: tuple[str, ...]) -> Annotations:
     classes, category = _codes(objects["class"])
     source_classes, source_category = _codes(objects["source_class"])
     texts, at = _codes(objects["attributes"], absent="{}")
@@ -179,11 +175,11 @@ def _annotations(objects: Any, points: tuple[str, ...], groups: tuple[str, ...])
     )
 
 
-def _codes(column: Any, absent: str = "") -> tuple[list[str], Numbers]:
+def _codes(column: pa.ChunkedArray, absent: str = "") -> tuple[list[str], Numbers]:
     """Number texts: the distinct ones, and the number of each row's text."""
     encoded = column.fill_null(absent).combine_chunks().dictionary_encode()
     return encoded.dictionary.to_pylist(), encoded.indices.to_numpy(zero_copy_only=False).astype(np.int32)
 
 
-def _reals(column: Any) -> Reals:
+def _reals(column: pa.ChunkedArray) -> Reals:
     return np.ascontiguousarray(column.to_numpy().astype(np.float64))

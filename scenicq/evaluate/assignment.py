@@ -1,20 +1,15 @@
 """Assign predictions to label objects: by centre distance, the highest score first, each object once."""
 
-# duckdb and pyarrow have no complete type stubs.
-# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
-# pyright: reportUnknownArgumentType=false
-
 from __future__ import annotations
 
 from contextlib import closing
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from scenicq.store.in_memory import connect_in_memory
+from scenicq.store.in_memory import connect_in_memory, fetch_columns
 
 __all__ = ["Centres", "Pairs", "assign", "find_pairs"]
 
@@ -70,18 +65,20 @@ def find_pairs(predictions: Centres, objects: Centres, reach_m: float, *, neares
         if nearest_only:
             # a pair of numbers is compared by the first, then by the second
             square = " + ".join(f"(p.{axis} - o.{axis}) * (p.{axis} - o.{axis})" for axis in axes)
-            found = connection.execute(
+            least = connection.execute(
                 f"SELECT prediction, least.number AS object, sqrt(least.square) AS distance FROM "
                 f"(SELECT p.number AS prediction, min({{square: {square}, number: o.number}}) AS least {joined} "
                 f"GROUP BY p.number) ORDER BY prediction"
-            ).fetchnumpy()
+            )
+            found = fetch_columns(least)
             return Pairs(_numbers(found["prediction"]), _numbers(found["object"]), np.asarray(found["distance"]))
-        found = connection.execute(
+        near_by = connection.execute(
             f"SELECT p.number AS prediction, o.number AS object, "
             f"{', '.join(f'p.{axis} - o.{axis} AS d{axis}' for axis in axes)} {joined} "
             "WHERE abs(p.x - o.x) < $reach AND abs(p.y - o.y) < $reach",
             {"reach": reach_m},
-        ).fetchnumpy()
+        )
+        found = fetch_columns(near_by)
     distance = np.sqrt(sum(np.square(found[f"d{axis}"]) for axis in axes))
     near = distance < reach_m
     prediction, numbers, distance = found["prediction"][near], found["object"][near], distance[near]
@@ -93,7 +90,7 @@ def _numbers(values: NDArray[np.int64]) -> Numbers:
     return np.asarray(values, dtype=np.int64)
 
 
-def _table(boxes: Centres) -> Any:
+def _table(boxes: Centres) -> pa.Table:
     columns = {"number": np.arange(len(boxes.x)), "frame": boxes.frame, "category": boxes.category}
     columns |= {"x": boxes.x, "y": boxes.y} | ({} if boxes.z is None else {"z": boxes.z})
     return pa.table(columns)

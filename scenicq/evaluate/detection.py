@@ -123,13 +123,16 @@ class Detection:
         return found
 
 
-def detect(dataset: Dataset, predictions: Predictions, missing: Missing = "error") -> Detection:
+def detect(
+    dataset: Dataset, predictions: Predictions, missing: Missing = "error", *, at_once: int = _AT_ONCE
+) -> Detection:
     """Find which label objects were detected.
 
     Args:
         dataset: The labels.
         predictions: The predictions.
         missing: What a frame without predictions is.
+        at_once: Boxes that are compared at once.
 
     Raises:
         DataError: predictions-missing, predictions-unmatched, predictions-frame; unknown-class for a class of the
@@ -171,7 +174,7 @@ def detect(dataset: Dataset, predictions: Predictions, missing: Missing = "error
         object_class[~roi.holds(objects, objects.frame)] = -1
         order = order[roi.holds(predictions.taken(order), frame[order])]
     predictions, frame, prediction_class = predictions.taken(order), frame[order], prediction_class[order]
-    owner = _owners(predictions, frame, prediction_class, objects, object_class, spatial=spatial)
+    owner = _owners(predictions, frame, prediction_class, objects, object_class, spatial=spatial, at_once=at_once)
     counted = np.flatnonzero(object_class >= 0)
     labels = _centres(objects, counted, objects.frame, object_class[counted], spatial=False)
     boxes = Centres(frame, prediction_class, predictions.x, predictions.y)
@@ -199,6 +202,7 @@ def detect(dataset: Dataset, predictions: Predictions, missing: Missing = "error
             frame,
             poses if of_ego else None,
             spatial=spatial,
+            at_once=at_once,
         ),
         flat=protocol.spatial and not spatial,
         distance=np.hypot(objects.x - frames.ego_x[objects.frame], objects.y - frames.ego_y[objects.frame]),
@@ -353,7 +357,7 @@ def _first_of_each(frame: Numbers, category: Numbers, protocol: Protocol) -> NDA
 
 def _owners(
     predictions: Predictions, frame: Numbers, category: Numbers, objects: Annotations, object_class: Numbers,
-    *, spatial: bool,
+    *, spatial: bool, at_once: int,
 ) -> dict[float, Numbers]:  # fmt: skip
     """The label object of each prediction at each centre distance, -1 without: some frames at a time."""
     owner = {threshold: np.full(len(frame), -1, dtype=np.int32) for threshold in THRESHOLDS_M}
@@ -363,7 +367,7 @@ def _owners(
     ends: list[int] = np.searchsorted(frame, np.arange(frames + 1), sorter=by_frame).tolist()
     begin = 0
     while begin < frames:
-        end = max(bisect_right(ends, ends[begin] + _AT_ONCE) - 1, begin + 1)
+        end = max(bisect_right(ends, ends[begin] + at_once) - 1, begin + 1)
         # in the order of falling scores again
         mine = np.sort(by_frame[ends[begin] : ends[end]])
         of_frames: NDArray[np.int64] = np.searchsorted(objects.frame, (begin, end))
@@ -390,7 +394,7 @@ def _centres(
 
 def _errors(
     predictions: Predictions, objects: Annotations, owner: Numbers, half_turn: Bools, frame: Numbers,
-    seen_from: EgoPoses | None, *, spatial: bool,
+    seen_from: EgoPoses | None, *, spatial: bool, at_once: int,
 ) -> Reals:  # fmt: skip
     """The errors of predictions that are label objects; headings are compared in the ego's frame, where it is given."""
     errors = np.full((len(owner), len(ERRORS)), np.nan)
@@ -401,8 +405,8 @@ def _errors(
         return np.column_stack((of.width[which], of.length[which], of.height[which]))
 
     found = np.flatnonzero(owner >= 0)
-    for first in range(0, len(found), _AT_ONCE):
-        mine = found[first : first + _AT_ONCE]
+    for first in range(0, len(found), at_once):
+        mine = found[first : first + at_once]
         its = owner[mine]
         headings = predictions.heading[mine], objects.heading[its]
         if seen_from is not None:

@@ -3,16 +3,12 @@
 Every export is a folder that appears when it is complete; elsewhere its last file does.
 """
 
-# pyarrow has no type stubs.
-# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
-
 from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
-from typing import Any
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -26,9 +22,10 @@ from scenicq.match.verdict import Match, Unknown
 from scenicq.query.execution.interval_frames import frames_of
 from scenicq.query.execution.result_summary import ResultSummary
 from scenicq.query.execution.results import Result
-from scenicq.store.atomic_files import check_writable, is_taken, whole_folder
+from scenicq.store.atomic_files import whole_folder
 from scenicq.store.dataset import Dataset
 from scenicq.store.remote_path import AnyPath
+from scenicq.store.targets import target_of
 
 __all__ = ["EXPORTS", "ExportSummary", "Exporter"]
 
@@ -82,12 +79,12 @@ class Exporter:
             message = f"an export `{self.kind}` needs a dataset from {wanted}, this one is from {importer}"
             hint = "`interchange`, `openlabel` and `paths` suit every dataset"
             raise DataError(Diagnostic("option-invalid", message, hints=(hint,)))
-        if is_taken(self.target):
+        if target_of(self.target).is_taken():
             hint = "choose another name: an export never replaces anything"
             raise DataError(Diagnostic("target-exists", f"{self.target} exists", hints=(hint,)))
         if not self.target.name or self.target.name == "..":
             raise DataError(Diagnostic("target-unwritable", f"{self.target} is not the name of a new folder"))
-        check_writable(self.target)
+        target_of(self.target).check_writable()
 
     def add(self, result: Result) -> None:
         """Take a result; those that are no match are passed over, of several of one frame the first counts.
@@ -163,9 +160,9 @@ def _argoverse2(export: Exporter, folder: Path, problems: list[Diagnostic]) -> N
         for role, track in each.roles.items()
     ]
     names = ("log_id", "timestamp_ns", "track_uuid", "role")
-    kinds: tuple[Any, ...] = (pa.string(), pa.int64(), pa.string(), pa.string())
-    arrays: list[Any] = [pa.array([row[number] for row in rows], kind) for number, kind in enumerate(kinds)]
-    table: Any = pa.table(arrays, names=list(names))
+    kinds = (pa.string(), pa.int64(), pa.string(), pa.string())
+    arrays = [pa.array([row[number] for row in rows], kind) for number, kind in enumerate(kinds)]
+    table = pa.table(arrays, names=list(names))
     feather.write_feather(table, str(folder / "matches.feather"), compression="uncompressed")
     pq.write_table(table, folder / "matches.parquet")
     _write_lines(folder / "logs.txt", list(dict.fromkeys(each.recording for each in export.matched.values())))

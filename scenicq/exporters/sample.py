@@ -15,10 +15,11 @@ from scenicq.forest.nodes import Value
 from scenicq.forest.scenario import BuiltIn, Scenario
 from scenicq.geometry.angles import normalize
 from scenicq.geometry.network import Network
-from scenicq.store.atomic_files import check_writable, whole_folder
+from scenicq.store.atomic_files import whole_folder
 from scenicq.store.classes import ROOT, is_class
 from scenicq.store.labels import Label, LabelObject
 from scenicq.store.remote_path import AnyPath
+from scenicq.store.targets import target_of
 
 __all__ = ["PATIENCE_S", "sample_labels", "sample_record", "write_sample"]
 
@@ -154,7 +155,7 @@ def write_sample(labels: Iterable[Label], network: Network, name: str, folder: A
     Raises:
         DataError: target-exists, target-unwritable.
     """
-    check_writable(folder)
+    target_of(folder).check_writable()
     try:
         with whole_folder(folder) as work:
             lines = [sample_record(label) for label in labels]

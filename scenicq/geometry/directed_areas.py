@@ -98,10 +98,23 @@ class DirectedAreas:
         return segments, heading_of_array(along[:, 0], along[:, 1]), starts
 
     @cached_property
+    def _segment_tree(self) -> STRtree:
+        ends = self.segments[0].reshape(-1, 2, 2)
+        return STRtree(shapes.boxes(np.concatenate([ends.min(axis=1), ends.max(axis=1)], axis=1)))
+
+    @cached_property
     def _rounded(self) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
         """The headings of all segments in order, rounded, and which of them each segment has."""
         distinct, number = np.unique(np.round(self.segments[1], _DIGITS), return_inverse=True)
         return distinct, number.astype(np.intp)
+
+    @cached_property
+    def _neighbours(self) -> NDArray[np.intp]:
+        """The segment before each in its area, and the one behind it; itself where there is none, (2, n)."""
+        starts = self.segments[2]
+        own = np.arange(starts[-1])
+        area = np.repeat(np.arange(len(self)), np.diff(starts))
+        return np.stack([np.maximum(own - 1, starts[area]), np.minimum(own + 1, starts[area + 1] - 1)])
 
     def alone(self, x: float, y: float) -> tuple[float, ...] | None:
         """The headings at a point that lies in one area; None at any other."""
@@ -176,11 +189,16 @@ class DirectedAreas:
         """
         if not len(self):
             return np.empty(0, dtype=np.intp), np.empty(0), np.empty((0, 2))
-        segments, headings, starts = self.segments
-        point, area = shapes.tree_pairs_around(self.tree, xy, np.hypot(steps[:, 0], steps[:, 1])[:, None])
-        place, segment = _each_segment(point, area, starts)
+        segments, headings, _ = self.segments
+        reach = np.hypot(steps[:, 0], steps[:, 1])[:, None] + beside
+        place, segment = shapes.tree_pairs_around(self._segment_tree, xy, reach)
         back = xy[place] - rotate_array(steps[place], headings[segment])
-        near = np.nonzero(segment_distances(back, segments[segment]) <= beside)[0]
+        away = segment_distances(back, segments[segment])
+        near = np.nonzero(away <= beside)[0]
+        # where the next segment of the same area is nearer, this one does not count: few are left
+        for neighbour in self._neighbours:
+            least = segment_distances(back[near], segments[neighbour[segment[near]]])
+            near = near[away[near] <= least + TIE]
         place, segment = place[near], segment[near]
         _, first = np.unique(place * len(segments) + self._rounded[1][segment], return_index=True)
         return place[first], headings[segment[first]], back[near[first]]

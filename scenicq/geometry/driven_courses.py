@@ -26,6 +26,7 @@ from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
+from shapely import STRtree
 from shapely.geometry import LineString, MultiPolygon, Polygon
 
 from scenicq.geometry import shapes
@@ -35,8 +36,8 @@ from scenicq.geometry.elements import Lane
 from scenicq.geometry.network import Network
 from scenicq.geometry.regions import PolygonSet, PolylineSet, Region
 
-__all__ = ["BEYOND_M", "GAP_S", "CourseLine", "CoursePlace", "Measures", "TrackStretch", "lane_course", "measure",
-           "track_courses"]  # fmt: skip
+__all__ = ["BEYOND_M", "GAP_S", "NO_COURSE", "CourseLine", "CoursePlace", "Measures", "TrackStretch", "lane_course",
+           "measure", "track_courses"]  # fmt: skip
 
 Numbers = NDArray[np.float64]
 
@@ -66,6 +67,10 @@ _JOINT_M = 1.0
 """How far apart lanes may begin at a place for one to go on in the other."""
 _KNOWN = 4096
 """Measures that are kept of a course."""
+_AT_ONCE = 16_384
+"""Places that are measured at once."""
+_FEW = 2_000
+"""Pairs of places and segments that are looked at without a search."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,6 +142,12 @@ class CourseLine:
         self.open_start = np.concatenate([_at(0, size, each.open_start) for each, size in sized])
         self.open_end = np.concatenate([_at(-1, size, each.open_end) for each, size in sized])
         self.extended = np.concatenate([np.full(size, each.extended) for each, size in sized])
+
+    @cached_property
+    def tree(self) -> STRtree:
+        """Its segments by place."""
+        ends = np.stack((self.start, self.start + self.step), axis=1)
+        return STRtree(shapes.segments(ends))
 
     @cached_property
     def region(self) -> PolylineSet:
@@ -243,9 +254,8 @@ def measure(courses: Sequence[CoursePlace], xy: Numbers) -> Measures:
             by_line.setdefault(id(each.line), []).append(number)
     for numbers in by_line.values():
         line = cast(CourseLine, courses[numbers[0]].line)
-        room = max(1, 2_000_000 // len(line.s))
-        for first in range(0, len(numbers), room):
-            some = numbers[first : first + room]
+        for first in range(0, len(numbers), _AT_ONCE):
+            some = numbers[first : first + _AT_ONCE]
             own = np.array([(courses[each].s, courses[each].time_s, courses[each].sign) for each in some])
             ends[some], extended[some] = _of_line(line, own, xy[some])
     return Measures((ends[:, 0], ends[:, 1]), (ends[:, 2], ends[:, 3]), extended)
@@ -255,63 +265,112 @@ def _of_line(line: CourseLine, own: Numbers, xy: Numbers) -> tuple[Numbers, NDAr
     """The ends of `along` and `beside` of places by one line, shape (n, 4), and which are beyond what was driven.
 
     Args:
-        line: The line of m segments.
+        line: The line.
         own: Where the object is, when, and which way it faces, shape (n, 3).
         xy: The places, shape (n, 2).
     """
-    n, m = len(xy), len(line.s)
-    to = xy[:, None, :] - line.start[None]  # (n, m, 2)
-    raw = (to * line.step).sum(axis=2) / line.length**2
-    part = np.clip(raw, 0.0, 1.0)
-    away = np.hypot(*np.moveaxis(to - part[:, :, None] * line.step, 2, 0))
-    side = line.step[:, 0] * to[:, :, 1] - line.step[:, 1] * to[:, :, 0]
-    reach = away.min(axis=1, keepdims=True) + PASS_M
-    active = away <= reach
-    from_start = np.hypot(to[:, :, 0], to[:, :, 1])
-    # a pass goes on from segment to segment where the corner between them is within reach, too
-    goes_on = np.zeros((n, m), np.bool_)
-    goes_on[:, 1:] = active[:, 1:] & active[:, :-1] & line.linked[1:] & (from_start[:, 1:] <= reach)
-    passes = np.cumsum(active & ~goes_on, axis=1) - 1 + (np.arange(n) * (m + 1))[:, None]
-    for end, start in line.joints:
-        together = active[:, end] & active[:, start] & (from_start[:, start] <= reach[:, 0])
-        for row in np.flatnonzero(together & (passes[:, end] != passes[:, start])).tolist():
-            passes[row, passes[row] == passes[row, start]] = passes[row, end]
-    least = np.full(n * (m + 1), np.inf)
-    np.minimum.at(least, passes[active], away[active])
-    near = active & (away <= np.where(active, least[np.maximum(passes, 0)], -np.inf) + _EQUAL_M)
-    late = _time_apart(line, part, own[:, 1:2])
-    soonest = np.where(near, late, np.inf).min(axis=1, keepdims=True)
-    timely = np.zeros(n * (m + 1), np.bool_)
-    timely[passes[near & (late <= soonest + SOON_S)]] = True
-    feet = near & timely[np.maximum(passes, 0)]
-    best = np.where(feet, away, np.inf).min(axis=1, keepdims=True)
-    feet &= away <= best + _EQUAL_M
-    sign = own[:, 2:3]
-    ahead = (line.s + part * line.length - own[:, 0:1]) * sign
-    left = np.copysign(away, side) * sign
-    beyond = feet & line.open_end & (raw > 1 + 1e-12)
-    before = feet & line.open_start & (raw < -1e-12)
-    forth, back = (beyond | before) & ((sign > 0) == beyond), (beyond | before) & ((sign > 0) == before)
-    low = np.where(back, -np.inf, ahead)
-    high = np.where(forth, np.inf, ahead)
+    near = _Segments(line, xy)
+    passes = near.passes(line.joints)
+    # of each pass what is nearest, of these the passes that are soonest, and of these what is nearest
+    feet = np.flatnonzero(near.away <= _least(near.away, passes)[passes] + _EQUAL_M)
+    row, segment = near.row[feet], near.segment[feet]
+    part, raw, away = (each[feet] for each in (near.part, near.raw, near.away))
+    late = _time_apart(line, segment, part, own[row, 1])
+    soon = np.unique(passes[feet][late <= _least(late, row)[row] + SOON_S])
+    mine = np.isin(passes[feet], soon)
+    mine &= away <= _least(np.where(mine, away, np.inf), row)[row] + _EQUAL_M
+    row, segment = row[mine], segment[mine]
+    part, raw, away = (each[mine] for each in (part, raw, away))
+
+    sign = own[row, 2]
+    ahead = (line.s[segment] + part * line.length[segment] - own[row, 0]) * sign
+    to, step = xy[row] - line.start[segment], line.step[segment]
+    left = np.copysign(away, step[:, 0] * to[:, 1] - step[:, 1] * to[:, 0]) * sign
+    beyond = line.open_end[segment] & (raw > 1 + 1e-12)
+    before = line.open_start[segment] & (raw < -1e-12)
     outside = beyond | before
+    forth, back = outside & ((sign > 0) == beyond), outside & ((sign > 0) == before)
+    low, high = np.where(back, -np.inf, ahead), np.where(forth, np.inf, ahead)
+    right, left = np.where(outside, -np.inf, left), np.where(outside, np.inf, left)
+    starts = np.searchsorted(row, np.arange(len(xy)))
     found = np.column_stack([
-        np.where(feet, low, np.inf).min(axis=1), np.where(feet, high, -np.inf).max(axis=1),
-        np.where(feet, np.where(outside, -np.inf, left), np.inf).min(axis=1),
-        np.where(feet, np.where(outside, np.inf, left), -np.inf).max(axis=1),
+        np.minimum.reduceat(low, starts), np.maximum.reduceat(high, starts),
+        np.minimum.reduceat(right, starts), np.maximum.reduceat(left, starts),
     ])  # fmt: skip
     # feet on both sides of a corner are one
     for start in (0, 2):
         same = found[:, start + 1] - found[:, start] <= _ONE_M
         found[same, start + 1] = found[same, start]
-    return found, (feet & line.extended).any(axis=1)
+    return found, np.logical_or.reduceat(line.extended[segment], starts)
 
 
-def _time_apart(line: CourseLine, part: Numbers, time: Numbers) -> Numbers:
-    """Seconds between a time and when the object was at points of segments, shape (n, m); 0 while it stood there."""
-    inside = line.begins[:, 1] + part * (line.ends[:, 0] - line.begins[:, 1])
-    low = np.where(part <= 0, line.begins[:, 0], np.where(part >= 1, line.ends[:, 0], inside))
-    high = np.where(part <= 0, line.begins[:, 1], np.where(part >= 1, line.ends[:, 1], inside))
+class _Segments:
+    """The segments by which a line comes by places: those at most `PASS_M` farther from one than the nearest is.
+
+    Attributes:
+        row, segment: Pairs of the number of a place, ascending, and of a segment, ascending; shape (k,).
+        raw: How far along its segment the foot of a place would be on its line, as a share.
+        part: The same within the segment.
+        away: How far the place is from the segment.
+        reached: Whether the place is as near to where the segment begins as segments may be.
+    """
+
+    def __init__(self, line: CourseLine, xy: Numbers) -> None:
+        """Find the segments of a line that are near places (n, 2)."""
+        self._count = len(line.s)
+        keys = np.arange(len(xy) * self._count) if len(xy) * self._count <= _FEW else self._around(line, xy)
+        row, segment = keys // self._count, keys % self._count
+        to, step = (xy[row] - line.start[segment]).T, line.step[segment].T
+        raw = (to[0] * step[0] + to[1] * step[1]) / line.length[segment] ** 2
+        part = np.clip(raw, 0.0, 1.0)
+        away = np.hypot(to[0] - part * step[0], to[1] - part * step[1])
+        reach = np.minimum.reduceat(away, np.searchsorted(row, np.arange(len(xy)))) + PASS_M
+        reached = np.hypot(*to) <= reach[row]
+        active = away <= reach[row]
+        self._keys, self.row, self.segment = (each[active] for each in (keys, row, segment))
+        self.raw, self.part, self.away = (each[active] for each in (raw, part, away))
+        self.reached = reached[active]
+        # a pass goes on from segment to segment where the corner between them is within reach, too
+        self._goes_on = np.zeros(len(self.row), np.bool_)
+        follows = (self._keys[1:] == self._keys[:-1] + 1) & line.linked[self.segment[1:]]
+        self._goes_on[1:] = follows & self.reached[1:]
+
+    def _around(self, line: CourseLine, xy: Numbers) -> NDArray[np.intp]:
+        """The pairs that the search tree finds, as numbers in order."""
+        points = shapes.points(xy)
+        reach = line.tree.query_nearest(points, all_matches=False, return_distance=True)[1] + PASS_M
+        row, segment = shapes.tree_pairs_within(line.tree, points, reach + _EQUAL_M)
+        return np.sort(row * self._count + segment)
+
+    def passes(self, joints: Sequence[tuple[int, int]]) -> NDArray[np.intp]:
+        """The number of the pass of each pair; joints are segments that end where others begin."""
+        found = np.cumsum(~self._goes_on) - 1
+        for end, start in joints:
+            begins = np.flatnonzero((self.segment == start) & self.reached)
+            ends = self._keys[begins] - start + end
+            place = np.minimum(np.searchsorted(self._keys, ends), len(self._keys) - 1)
+            there = self._keys[place] == ends
+            one, other = found[place[there]], found[begins[there]]
+            if np.any(one != other):
+                renamed = np.arange(len(found))
+                renamed[other] = one
+                found = renamed[found]
+        return found
+
+
+def _least(values: Numbers, group: NDArray[np.intp]) -> Numbers:
+    """The least value of each of some groups, which are numbered below the number of values."""
+    least = np.full(len(values), np.inf)
+    np.minimum.at(least, group, values)
+    return least
+
+
+def _time_apart(line: CourseLine, segment: NDArray[np.intp], part: Numbers, time: Numbers) -> Numbers:
+    """Seconds between times and when the object was at points of segments, shape (k,); 0 while it stood there."""
+    begins, ends = line.begins[segment], line.ends[segment]
+    inside = begins[:, 1] + part * (ends[:, 0] - begins[:, 1])
+    low = np.where(part <= 0, begins[:, 0], np.where(part >= 1, ends[:, 0], inside))
+    high = np.where(part <= 0, begins[:, 1], np.where(part >= 1, ends[:, 1], inside))
     return np.maximum(np.maximum(low - time, time - high), 0.0)
 
 

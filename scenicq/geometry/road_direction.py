@@ -122,13 +122,22 @@ class RoadDirection:
             found += self._lanes.cells(lane, bounds, heading)
         numbers: list[int] = np.sort(shapes.tree_query(self._beside.tree, box)).tolist()
         for number in numbers:
-            own = self._beside.directed[number][0]
-            meeting: list[int] = np.sort(shapes.tree_within(self._lanes.tree, own, 0.0)).tolist()
-            off = tuple(Off(self._lanes.directed[lane][0]) for lane in meeting)
             for cell in self._beside.cells(number, bounds, heading):
-                part = FieldCell(cell.polygon, cell.heading, (*cell.guards, *off)).part(bounds)
+                part = FieldCell(cell.polygon, cell.heading, (*cell.guards, *self._off_lanes(number))).part(bounds)
                 found += [part] if part is not None else []
         return found + self._surroundings.cells(bounds)
+
+    def _off_lanes(self, number: int) -> tuple[Off, ...]:
+        """The lanes that meet one of what is beside them, where it does not count."""
+        if number not in self._met:
+            own = self._beside.directed[number][0]
+            meeting: list[int] = np.sort(shapes.tree_within(self._lanes.tree, own, 0.0)).tolist()
+            self._met[number] = tuple(Off(self._lanes.directed[lane][0]) for lane in meeting)
+        return self._met[number]
+
+    @cached_property
+    def _met(self) -> dict[int, tuple[Off, ...]]:
+        return {}
 
     @cached_property
     def _lanes(self) -> DirectedAreas:

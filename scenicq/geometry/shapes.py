@@ -56,6 +56,11 @@ def line(corners: Coordinates | Sequence[XY]) -> Shape:
     return cast(Shape, shapely.linestrings(np.asarray(corners, dtype=float)))
 
 
+def segments(ends: NDArray[np.float64]) -> NDArray[Any]:
+    """Lines between two points each, whose coordinates have shape (n, 2, 2)."""
+    return cast("NDArray[Any]", shapely.linestrings(ends))
+
+
 def points(xy: Coordinates) -> NDArray[Any]:
     """Array (n,) of points."""
     return cast("NDArray[Any]", shapely.points(xy))

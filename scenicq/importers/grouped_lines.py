@@ -5,10 +5,6 @@ neighbouring lines; whoever reads a recording jumps there. Files in which one ca
 unpacked into a scratch folder.
 """
 
-# pyarrow has no type stubs.
-# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
-# pyright: reportUnknownArgumentType=false
-
 from __future__ import annotations
 
 import gzip
@@ -30,7 +26,7 @@ from scenicq.importers.fields import InvalidError, parse_json
 from scenicq.importers.report import Report
 from scenicq.store.unpacked import RECORD_BYTES, Bound, check_claims, decoded_bytes, text_columns
 
-__all__ = ["GroupedLines", "Runs", "group_lines"]
+__all__ = ["GroupedLines", "LineBounds", "Runs", "group_lines"]
 
 Runs = tuple[int, ...]
 """Runs of neighbouring lines, four numbers each: file, number of the first line, its offset, offset of the end."""
@@ -38,10 +34,17 @@ Runs = tuple[int, ...]
 _KEY = re.compile(rb'"recording"\s*:\s*"([^"\\]*)"')
 
 
-_LONGEST_LINE = 1 << 26
-"""Bytes of a line; a label of a hundred thousand objects has a third of that."""
-_MOST_EMPTY = 1_000_000
-"""Empty lines of a file."""
+@dataclass(frozen=True, slots=True)
+class LineBounds:
+    """What a file of lines may be.
+
+    Attributes:
+        longest: Bytes of a line; a label of a hundred thousand objects has a third of that.
+        empty: Empty lines.
+    """
+
+    longest: int = 1 << 26
+    empty: int = 1_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +91,7 @@ class _Found:
 
 
 def group_lines(
-    files: Sequence[Path], scratch: Path | None, report: Report
+    files: Sequence[Path], scratch: Path | None, report: Report, bounds: LineBounds | None = None
 ) -> tuple[GroupedLines, dict[str, tuple[int, str]], int]:
     """Note the places of all lines.
 
@@ -96,6 +99,7 @@ def group_lines(
         files: JSON lines, packed or not, or Parquet.
         scratch: Folder for what is unpacked; it must stay as long as lines are read.
         report: Takes what is unsound.
+        bounds: What a file may be; more than sources have by default.
 
     Returns:
         The lines; number of bytes and digest of the content of each recording, by name; and the number of all lines.
@@ -112,7 +116,7 @@ def group_lines(
             plain = _seekable(path, scratch, number, report)
             readable.append((plain, path.name))
             with plain.open("rb") as file:
-                total += _note(number, file, path.name, found, report)
+                total += _note(number, file, path.name, found, report, bounds or LineBounds())
         except OSError as error:
             raise _unreadable(path, error) from error
     names = sorted(found)
@@ -120,17 +124,17 @@ def group_lines(
     return GroupedLines(tuple(readable), {name: tuple(found[name].runs) for name in names}), about, total
 
 
-def _note(number: int, file: IO[bytes], name: str, found: dict[str, _Found], report: Report) -> int:
+def _note(number: int, file: IO[bytes], name: str, found: dict[str, _Found], report: Report, bounds: LineBounds) -> int:
     total = offset = 0
     empty = 0
-    for line, (content, length) in enumerate(_lines(file), start=1):
+    for line, (content, length) in enumerate(_lines(file, bounds.longest), start=1):
         if content is None:
             message = f"{name}:{line}: a line of {length:,} bytes is no label"
             report.leave_out("label", "file-invalid", message)
         elif not content.strip():
             empty += 1
-            if empty > _MOST_EMPTY:
-                raise DataError(Diagnostic("file-invalid", f"{name} has more than {_MOST_EMPTY:,} empty lines"))
+            if empty > bounds.empty:
+                raise DataError(Diagnostic("file-invalid", f"{name} has more than {bounds.empty:,} empty lines"))
         else:
             total += 1
             recording = _recording(content, f"{name}:{line}", report)
@@ -149,14 +153,14 @@ def _note(number: int, file: IO[bytes], name: str, found: dict[str, _Found], rep
     return total
 
 
-def _lines(file: IO[bytes]) -> Iterator[tuple[bytes | None, int]]:
+def _lines(file: IO[bytes], longest: int) -> Iterator[tuple[bytes | None, int]]:
     """The lines of a file with their lengths; None in place of one that is too long, which is not kept in memory."""
-    while content := file.readline(_LONGEST_LINE):
+    while content := file.readline(longest):
         length = len(content)
-        if length < _LONGEST_LINE or content.endswith(b"\n"):
+        if length < longest or content.endswith(b"\n"):
             yield content, length
             continue
-        while more := file.readline(_LONGEST_LINE):
+        while more := file.readline(longest):
             length += len(more)
             if more.endswith(b"\n"):
                 break

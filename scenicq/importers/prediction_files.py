@@ -1,9 +1,5 @@
 """Files of predictions: nuScenes detection results, Argoverse 2 detections, and the interchange format with scores."""
 
-# pyarrow has no type stubs.
-# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
-# pyright: reportUnknownArgumentType=false
-
 from __future__ import annotations
 
 import math

@@ -1,8 +1,5 @@
 """A dataset opened for a notebook or a script: `scenicq.open`."""
 
-# DuckDB's relations have no useful types.
-# pyright: reportUnknownMemberType=false
-
 from __future__ import annotations
 
 from collections.abc import Iterator

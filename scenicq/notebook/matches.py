@@ -1,9 +1,5 @@
 """What a query has found: results to go through, as a table, in words, as pictures and as a report."""
 
-# pyarrow and pandas have no type stubs here.
-# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
-# pyright: reportUnknownParameterType=false, reportUnknownArgumentType=false
-
 from __future__ import annotations
 
 import json
@@ -241,7 +237,8 @@ class Matches(Sequence[FrameResult]):
 
     def __getitem__(self, which: Any) -> Any:
         """A result by its number, several by a slice."""
-        return self._all()[which]
+        found: Any = self._all()[which]
+        return found
 
     def select(self, *, where: str | None = None, sort: str | None = None) -> Matches:
         """Some of the matches, or all in another order, by what the program records; nothing is matched again.

@@ -24,7 +24,7 @@ _FORMATS = {".jpg": "JPEG", ".jpeg": "JPEG", ".png": "PNG", ".webp": "WEBP"}
 """Images by extension; Pillow must not try others, of which some run other programs."""
 _MOST_PIXELS = 50_000_000
 """Pixels up to which an image is opened: four times the largest camera in use."""
-_INSIDE_BYTES = 10_000_000
+INSIDE_BYTES = 10_000_000
 """Bytes of thumbnails that are put into a page; others lie beside it."""
 
 
@@ -123,7 +123,7 @@ class SensorFiles:
 
     def _kept(self, file: Path, small: bytes) -> str:
         """The address of a small image."""
-        if self.inside and self._bytes + len(small) <= _INSIDE_BYTES:
+        if self.inside and self._bytes + len(small) <= INSIDE_BYTES:
             self._bytes += len(small)
             return f"data:image/jpeg;base64,{base64.b64encode(small).decode()}"
         name = f"thumbnails/{hashlib.sha256(os.fsencode(file)).hexdigest()[:20]}.jpg"

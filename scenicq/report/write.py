@@ -32,8 +32,9 @@ from scenicq.report.shares import program_lines
 from scenicq.report.sheet import sheet_section, timelines_section, to_picture
 from scenicq.report.templates import markup
 from scenicq.report.timelines import interval_runs
-from scenicq.store.atomic_files import check_writable, whole_folder
+from scenicq.store.atomic_files import whole_folder
 from scenicq.store.remote_path import AnyPath, RemotePath
+from scenicq.store.targets import target_of
 
 if TYPE_CHECKING:
     from markupsafe import Markup
@@ -61,7 +62,7 @@ def check_target(folder: AnyPath) -> None:
     """
     if isinstance(folder, RemotePath):
         _check_new(folder)
-        check_writable(folder)
+        target_of(folder).check_writable()
         return
     try:
         if not folder.exists() or (folder.is_dir() and not any(folder.iterdir())):

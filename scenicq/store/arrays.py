@@ -28,12 +28,12 @@ FEW = 200_000
 
 
 @cache
-def _dtype(kind: Any) -> Any:
+def _dtype(kind: pa.DataType) -> np.dtype[Any]:
     """NumPy's type of a `pyarrow` type of numbers, which `pyarrow` tells before version 26 only where pandas is."""
     return pa.array([], kind).to_numpy().dtype
 
 
-def number_array(values: NDArray[Any], kind: Any) -> ArrowArray:
+def number_array(values: NDArray[Any], kind: pa.DataType) -> ArrowArray:
     """Numbers or truth values of shape (n,) as an array of a type that can hold them; nan becomes null.
 
     Args:
@@ -69,7 +69,7 @@ class Texts:
     def __init__(self, texts: Sequence[str]) -> None:
         """Take the texts."""
         self._texts = [*texts, None]
-        self._array: ArrowArray = None
+        self._array: ArrowArray | None = None
         self._taken = 0
 
     def at(self, numbers: NDArray[np.int64]) -> ArrowArray:

@@ -135,7 +135,7 @@ class Dataset:
     @property
     def maps(self) -> tuple[str, ...]:
         """Names of the maps, sorted, including those that labels name and the source lacks."""
-        return tuple(sorted({*self.manifest.maps, *self.manifest.by_map}))
+        return self.manifest.named_maps
 
     def files(self, table: str) -> tuple[StoreFile, ...]:
         """A table's Parquet files, in the order of their rows; absolute paths where they are on this machine."""
@@ -335,7 +335,7 @@ def open_dataset(address: str | Path, *, older: bool = False, check: bool = True
 
         try:
             with dataset.blamed():
-                check_dataset(dataset)
+                check_dataset(place, manifest)
         except DataError:
             dataset.verify()  # a file that was damaged since is another matter
             raise

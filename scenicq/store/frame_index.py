@@ -54,10 +54,11 @@ def find_rows(files: Sequence[StoreFile], frames: Collection[str]) -> NDArray[np
     for path in files if len(wanted) else ():
         with open_parquet(path) as file:
             for group in range(file.num_row_groups):
-                statistics = file.metadata.row_group(group).column(0).statistics
-                low, high = np.uint64(statistics.min), np.uint64(statistics.max)
-                if np.searchsorted(wanted, low) == np.searchsorted(wanted, high, side="right"):
-                    continue
+                known = file.metadata.row_group(group).column(0).statistics
+                if known is not None and known.has_min_max:
+                    low, high = np.uint64(known.min), np.uint64(known.max)
+                    if np.searchsorted(wanted, low) == np.searchsorted(wanted, high, side="right"):
+                        continue
                 table = file.read_row_group(group)
                 hashes = table["hash"].to_numpy()
                 places = np.searchsorted(hashes, wanted)

@@ -4,12 +4,19 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     import duckdb
 
-__all__ = ["connect_in_memory"]
+__all__ = ["connect_in_memory", "fetch_columns"]
+
+
+def fetch_columns(found: duckdb.DuckDBPyConnection) -> dict[str, NDArray[Any]]:
+    """The columns of what SQL has found."""
+    return found.fetchnumpy()
 
 
 def connect_in_memory(config: Mapping[str, bool | int | str] | None = None) -> duckdb.DuckDBPyConnection:

@@ -167,6 +167,11 @@ class Manifest(Struct, frozen=True, kw_only=True, tag_field="format", tag=_FORMA
         parts = [(name, [part.sha256 for part in parts]) for name, parts in sorted(self.tables.items())]
         return hashlib.sha256(repr(parts).encode()).hexdigest()
 
+    @property
+    def named_maps(self) -> tuple[str, ...]:
+        """Names of the maps, sorted, including those that labels name and the source lacks."""
+        return tuple(sorted({*self.maps, *self.by_map}))
+
     def to_json(self) -> str:
         """The text of `dataset.json`."""
         return msgspec.json.format(msgspec.json.encode(self), indent=1).decode() + "\n"

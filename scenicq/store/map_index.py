@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scenicq.geometry.angles import normalize_array
 from scenicq.geometry.centerlines import centerlines, lane_direction
 from scenicq.geometry.features import MapFeature, names
+from scenicq.geometry.network import Network
 from scenicq.geometry.own_directions import along_centerline
 from scenicq.geometry.road_direction import RoadDirection
 from scenicq.store.arrays import Texts
@@ -135,6 +136,11 @@ class MapIndex:
         turns[np.isnan(headings[member])] = 0.0
         found[inside] = turns
         return found
+
+    @cached_property
+    def network(self) -> Network:
+        """The map as a network."""
+        return Network("", self._features)
 
     @cached_property
     def _lane_of(self) -> NDArray[np.int64]:

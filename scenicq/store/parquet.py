@@ -9,9 +9,9 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from scenicq.store.atomic_files import sync_folder
 from scenicq.store.manifest import Part
 from scenicq.store.schema import GEO_METADATA, SCHEMA_VERSION, SCHEMAS, ArrowTable
+from scenicq.store.targets import sync_folder
 
 __all__ = ["TableWriter", "part_path"]
 
@@ -33,13 +33,14 @@ def part_path(table: str, number: int, sha256: str) -> str:
 class TableWriter:
     """Collects rows of a table and writes them in row groups of one size, however they come in."""
 
-    def __init__(self, folder: Path, table: str, number: int = 0) -> None:
+    def __init__(self, folder: Path, table: str, number: int = 0, *, row_group: int = _ROW_GROUP) -> None:
         """Open a file under a temporary name.
 
         Args:
             folder: The dataset's folder.
             table: A key of `SCHEMAS`.
             number: The part's number.
+            row_group: The rows of a row group.
 
         Raises:
             OSError: The folder cannot be written.
@@ -53,6 +54,7 @@ class TableWriter:
         self._pending: list[ArrowTable] = []
         self._pending_rows = 0
         self._rows = 0
+        self._row_group = row_group
         texts = [field.name for field in self._schema if field.type == pa.string() and field.name not in _DISTINCT]
         reals = [field.name for field in self._schema if field.type == pa.float64()]
         self._writer = pq.ParquetWriter(
@@ -60,8 +62,8 @@ class TableWriter:
             self._schema,
             compression="zstd",
             # A dictionary of floats only costs: they hardly repeat. Splitting their bytes compresses better.
-            use_dictionary=texts,  # pyright: ignore[reportArgumentType]
-            use_byte_stream_split=reals,  # pyright: ignore[reportArgumentType]
+            use_dictionary=texts,
+            use_byte_stream_split=reals,
         )
 
     def add(self, rows: ArrowTable) -> None:
@@ -72,8 +74,8 @@ class TableWriter:
             self._few = []
         self._pending_rows += len(rows)
         self._rows += len(rows)
-        if self._pending_rows >= _ROW_GROUP:
-            self._flush(self._pending_rows // _ROW_GROUP * _ROW_GROUP)
+        if self._pending_rows >= self._row_group:
+            self._flush(self._pending_rows // self._row_group * self._row_group)
 
     def end_group(self, least: int) -> None:
         """Let a row group end here, if it has so many rows: a search for what follows reads no more than that.
@@ -110,7 +112,7 @@ class TableWriter:
 
     def _flush(self, rows: int) -> None:
         table = pa.concat_tables([*self._pending, *self._few]).combine_chunks()
-        self._writer.write_table(table.slice(0, rows), row_group_size=_ROW_GROUP)
+        self._writer.write_table(table.slice(0, rows), row_group_size=self._row_group)
         rest = table.slice(rows)
         self._pending, self._few = [rest] if len(rest) else [], []
         self._pending_rows = len(rest)

@@ -1,12 +1,8 @@
 """The rows of one file of a table in order, read forwards in batches, so that memory does not grow with the file."""
 
-# pyarrow has no type stubs.
-# pyright: reportAttributeAccessIssue=false
-
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -40,14 +36,14 @@ class PartRows:
         self._file = file
         self._schema = SCHEMAS[table]
         with decoding(name):
-            self._parquet: Any = open_parquet(file)
+            self._parquet = open_parquet(file)
             check_columns(self._parquet, list(self._schema), self._parquet.schema_arrow.names, name)
         sizes = [self._parquet.metadata.row_group(group).num_rows for group in range(self._parquet.num_row_groups)]
         self._ends = [sum(sizes[: group + 1]) for group in range(len(sizes))]
         self.rows: int = sum(sizes)
         self._first = 0
         self._there: ArrowTable = self._schema.empty_table()
-        self._batches: Iterator[Any] = self._from_group(0)
+        self._batches = self._from_group(0)
 
     def take(self, first: int, count: int) -> ArrowTable:
         """Read some rows; those before them are skipped, whole row groups of them unread.
@@ -98,6 +94,6 @@ class PartRows:
         """Close the file."""
         self._parquet.close()
 
-    def _from_group(self, group: int) -> Iterator[Any]:
+    def _from_group(self, group: int) -> Iterator[pa.RecordBatch]:
         groups = list(range(group, len(self._ends)))
         return iter(self._parquet.iter_batches(batch_size=_BATCH, row_groups=groups, use_threads=False))

@@ -20,9 +20,9 @@ from pathlib import Path
 from typing import IO
 
 from scenicq.errors import DataError, Diagnostic
-from scenicq.store.atomic_files import Spare, sync_folder
 from scenicq.store.manifest import FOLDERS, check_path, find_links, is_dataset
 from scenicq.store.read_lock import nobody_reads
+from scenicq.store.targets import Spare, sync_folder
 
 try:
     import fcntl

@@ -199,7 +199,7 @@ def stamp_of(place: Place, manifest: Manifest) -> str:
     return hashlib.sha256(place.manifest() + place.stamp(every).encode()).hexdigest()
 
 
-def open_parquet(file: StoreFile, **options: Any) -> Any:
+def open_parquet(file: StoreFile, **options: Any) -> pq.ParquetFile:
     """Open a file as a `pyarrow.parquet.ParquetFile`; the caller closes it.
 
     Args:

@@ -20,7 +20,8 @@ from scenicq.number_ranges import expand_ranges
 from scenicq.store.camera_rows import CAMERA_COLUMNS, cameras_of
 from scenicq.store.columns import OUT_OF_PLANE
 from scenicq.store.labels import Label, LabelObject, Motion, OutOfPlane
-from scenicq.store.place import StoreFile, open_parquet
+from scenicq.store.place import StoreFile
+from scenicq.store.row_block import RowBlock
 from scenicq.store.schema import ArrowTable
 
 if TYPE_CHECKING:
@@ -32,7 +33,6 @@ __all__ = [
     "LAST",
     "MOTION_COLUMNS",
     "OBJECT_COLUMNS",
-    "RowFile",
     "assemble",
     "read_labels",
 ]
@@ -47,8 +47,6 @@ OBJECT_COLUMNS.extend(("track", "attributes", LAST))
 MOTION_COLUMNS = ["motion_vx", "motion_vy", "acceleration", "yaw_rate", "motion_derived"]
 """What is computed of motion; a query that does not ask for it need not read it."""
 EGO_COLUMNS = [f"ego_{name}" for name in OBJECT_COLUMNS[1:]]
-_REPEATED = ("class", "track", "recording", "map", "channel", "attributes", "params")
-"""Ends of the names of columns with few distinct texts in many rows: decoding each once is several times faster."""
 LABEL_COLUMNS = ["frame", "recording", "timestamp_us", "map", "params", "object_count", "sensor_count"]
 LABEL_COLUMNS.extend(("first_object", "first_sensor"))
 
@@ -79,7 +77,7 @@ def read_labels(
     for labels, objects, sensors in parts:
         if rows is not None and not len(rows):
             return
-        with RowFile(labels, of_labels) as frame_rows:
+        with RowBlock(labels, of_labels) as frame_rows:
             size = len(frame_rows)
             if rows is None:
                 chosen = np.arange(size)
@@ -89,8 +87,8 @@ def read_labels(
             first += size
             if len(chosen):
                 with (
-                    RowFile(objects, [*OBJECT_COLUMNS, *more]) as object_rows,
-                    RowFile(sensors, of_sensors) as sensor_rows,
+                    RowBlock(objects, [*OBJECT_COLUMNS, *more]) as object_rows,
+                    RowBlock(sensors, of_sensors) as sensor_rows,
                 ):
                     for start in range(0, len(chosen), _BATCH):
                         table = frame_rows.take(chosen[start : start + _BATCH])
@@ -104,57 +102,11 @@ def read_labels(
                         yield from assemble(table, others, channels, recorded)
 
 
-def _members(rows: RowFile, frames: ArrowTable, what: str) -> ArrowTable:
+def _members(rows: RowBlock, frames: ArrowTable, what: str) -> ArrowTable:
     """The rows of another table that belong to some frames."""
     first = frames[f"first_{what}"].to_numpy().astype(np.int64)
     counts = frames[f"{what}_count"].to_numpy().astype(np.int64)
     return rows.take(expand_ranges(first, counts))
-
-
-class RowFile:
-    """The rows of a file as one range of numbers, decoded one row group at a time."""
-
-    def __init__(self, file: StoreFile, columns: list[str]) -> None:
-        """Open a file, of which some columns are read."""
-        self._columns = columns
-        shared = [name for name in columns if name.endswith(_REPEATED)]
-        self._file = open_parquet(file, read_dictionary=shared)
-        sizes = [self._file.metadata.row_group(group).num_rows for group in range(self._file.num_row_groups)]
-        self._starts = np.cumsum([0, *sizes])
-        self._decoded: tuple[int, ArrowTable] | None = None
-
-    def __enter__(self) -> RowFile:
-        """Nothing is read yet."""
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        """Close the file."""
-        self.close()
-
-    def close(self) -> None:
-        """Close the file."""
-        self._file.close()
-
-    def __len__(self) -> int:
-        """The number of rows."""
-        return int(self._starts[-1])
-
-    def take(self, rows: NDArray[np.int64]) -> ArrowTable:
-        """Some rows, given in order."""
-        pieces: list[ArrowTable] = []
-        while len(rows):
-            group = int(np.searchsorted(self._starts, rows[0], side="right")) - 1
-            inside = int(np.searchsorted(rows, self._starts[group + 1]))
-            local, rows = rows[:inside] - self._starts[group], rows[inside:]
-            table = self._group(group)
-            together = local[-1] - local[0] + 1 == len(local)
-            pieces.append(table.slice(local[0], len(local)) if together else table.take(local))
-        return pa.concat_tables(pieces) if pieces else pa.table({name: [] for name in self._columns})
-
-    def _group(self, group: int) -> ArrowTable:
-        if self._decoded is None or self._decoded[0] != group:
-            self._decoded = group, self._file.read_row_group(group, columns=self._columns)
-        return self._decoded[1]
 
 
 def assemble(
@@ -223,7 +175,7 @@ def _values(table: ArrowTable, name: str) -> list[Any]:
     is_json = name.endswith(("attributes", "params"))
     if name not in table.column_names:
         return [{} if is_json else None] * len(table)
-    column: Any = table[name]
+    column = table[name]
     if column.null_count == len(column):
         return [{} if is_json else None] * len(column)
     if is_json and not pa.types.is_dictionary(column.type):

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 from numpy.typing import NDArray
 
 from scenicq.errors import DataError, Diagnostic
@@ -150,10 +151,10 @@ def _members(rows: ArrowTable, prefix: str, ids: list[str]) -> MemberColumns:
     )
 
 
-def _whole(column: Any) -> NDArray[np.int64]:
+def _whole(column: pa.ChunkedArray) -> NDArray[np.int64]:
     return column.to_numpy().astype(np.int64)
 
 
-def _reals(column: Any) -> NDArray[np.float64]:
+def _reals(column: pa.ChunkedArray) -> NDArray[np.float64]:
     """Null becomes nan."""
     return column.to_numpy().astype(np.float64)

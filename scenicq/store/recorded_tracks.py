@@ -17,7 +17,7 @@ from scenicq.geometry.network import Network
 from scenicq.recent import Recent
 from scenicq.store.motion import slopes
 from scenicq.store.place import StoreFile
-from scenicq.store.reader import RowFile
+from scenicq.store.row_block import RowBlock
 
 __all__ = ["EGO", "RecordedTracks", "RecordingCourses"]
 
@@ -71,7 +71,7 @@ class RecordedTracks:
         """Take the function that names the files of a table, part by part; no file is opened yet."""
         self._files = files
         self._runs: dict[str, tuple[int, int, int]] | None = None
-        self._open: tuple[int, RowFile, RowFile] | None = None
+        self._open: tuple[int, RowBlock, RowBlock] | None = None
         self._kept: Recent[str, RecordingCourses] = Recent(_KEPT)
 
     def of(self, recording: str) -> RecordingCourses:
@@ -132,21 +132,21 @@ class RecordedTracks:
         frames = {name: number for number, name in enumerate(rows["frame"].to_pylist())}
         return RecordingCourses(frames, (times - times[0]) / 1e6, tracks)
 
-    def _opened(self, part: int) -> tuple[RowFile, RowFile]:
+    def _opened(self, part: int) -> tuple[RowBlock, RowBlock]:
         if self._open is None or self._open[0] != part:
             if self._open is not None:
                 for file in self._open[1:]:
                     file.close()
             of_labels = ["frame", "timestamp_us", "object_count", "first_object", "ego_class"]
-            labels = RowFile(self._files("labels")[part], [*of_labels, *(f"ego_{name}" for name in _PLACE)])
-            self._open = part, labels, RowFile(self._files("objects")[part], ["track", *_PLACE])
+            labels = RowBlock(self._files("labels")[part], [*of_labels, *(f"ego_{name}" for name in _PLACE)])
+            self._open = part, labels, RowBlock(self._files("objects")[part], ["track", *_PLACE])
         return self._open[1:]
 
     def _find_runs(self) -> dict[str, tuple[int, int, int]]:
         """The part that has each recording, and the rows of its labels there, the last left out."""
         found: dict[str, tuple[int, int, int]] = {}
         for part, file in enumerate(self._files("labels")):
-            with RowFile(file, ["recording"]) as rows:
+            with RowBlock(file, ["recording"]) as rows:
                 names = np.array(rows.take(np.arange(len(rows)))["recording"].to_pylist(), dtype=object)
             cuts = [0, *(np.flatnonzero(names[1:] != names[:-1]) + 1).tolist(), len(names)]
             for first, end in pairwise(cuts):

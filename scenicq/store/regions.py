@@ -11,6 +11,7 @@ from typing import Any, cast
 import msgspec
 import numpy as np
 import pyarrow as pa
+import pyarrow.parquet as pq
 import shapely
 from numpy.typing import NDArray
 
@@ -126,11 +127,11 @@ class _RowGroups:
         ends: The least and the greatest name of a map in each row group; None where it is not said.
     """
 
-    metadata: Any
+    metadata: pq.FileMetaData
     ends: tuple[tuple[str, str] | None, ...]
 
     @classmethod
-    def of(cls, metadata: Any) -> _RowGroups:
+    def of(cls, metadata: pq.FileMetaData) -> _RowGroups:
         """What a footer says."""
         column = SCHEMAS["regions"].get_field_index("map")
         told = [metadata.row_group(group).column(column).statistics for group in range(metadata.num_row_groups)]

@@ -1,7 +1,7 @@
 """Files and folders elsewhere: the methods of `Path` that writers and readers of whole files use, over fsspec.
 
 An object appears with its whole content or not at all; nothing else is atomic there. Where there are several,
-`atomic_files` writes the last one when all others are there.
+`targets` sends the last one when all others are there.
 """
 
 # fsspec is optional and has no types.

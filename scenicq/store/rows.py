@@ -13,10 +13,12 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from scenicq.geometry.angles import normalize_array
+from scenicq.geometry.network import Network
 from scenicq.number_ranges import expand_ranges
 from scenicq.store.arrays import lists_at, number_array, repeated_texts
 from scenicq.store.camera_rows import camera_columns
 from scenicq.store.columns import OUT_OF_PLANE, MemberColumns, Memberships, RecordingColumns
+from scenicq.store.ego_courses import course_columns
 from scenicq.store.last_lanes import ego_and_object_tracks
 from scenicq.store.motion import motion_of
 from scenicq.store.schema import SCHEMAS, ArrowArray, ArrowTable
@@ -90,6 +92,7 @@ def recording_rows(
                 **_properties(objects),
                 **_motion("", times[label_of], objects, objects.track),
                 **_relative(egos, objects, label_of),
+                **course_columns(_nowhere() if index is None else index.network, times, egos, objects, label_of),
                 "road_directions": lists_at(placed.directions, placed.place[object_at]),
                 "lane": _names(index, placed.lane[object_at]),
                 "last_lane": _known(last_lane[object_at]),
@@ -166,6 +169,10 @@ def _memberships(
         "distance": near.distance,
         "turn": turns,
     }
+
+
+def _nowhere() -> Network:
+    return Network("", ())
 
 
 def _names(index: MapIndex | None, features: NDArray[np.int64]) -> ArrowArray:

@@ -4,9 +4,6 @@ Readers take rows by number, the prefilter joins them by name; both must find th
 column `row`, the numbers of its rows from 0; `objects` and `sensors` have `label`, the row of their label.
 """
 
-# pyarrow has no type stubs.
-# pyright: reportAttributeAccessIssue=false
-
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping

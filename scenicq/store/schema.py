@@ -10,7 +10,7 @@ These four tables are split into parts of whole recordings; parts of one number 
 from __future__ import annotations
 
 import json
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import pyarrow as pa
 
@@ -26,16 +26,16 @@ __all__ = [
     "ArrowTable",
 ]
 
-ArrowTable: TypeAlias = Any
-"""A `pyarrow.Table`; pyarrow has no type stubs, so checkers know nothing of it."""
+ArrowTable: TypeAlias = pa.Table
+"""Rows of a table."""
 
-ArrowArray: TypeAlias = Any
-"""A `pyarrow.Array`."""
+ArrowArray: TypeAlias = pa.Array
+"""A column of rows."""
 
-SCHEMA_VERSION = 7
+SCHEMA_VERSION = 8
 """Changes with every change of a table that a reader could notice."""
 
-UPGRADABLE = frozenset({2, 3, 4, 5, 6})
+UPGRADABLE = frozenset({2, 3, 4, 5, 6, 7})
 """Older versions of which `scenicq index` makes this one: it computes anew what is computed."""
 
 ADDED = {4: frozenset({"z", "pitch", "roll", "image_width", "image_height", "intrinsics", "camera_pose"})}
@@ -47,15 +47,15 @@ MEMBERSHIP_RADIUS_M = 2.0
 _TEXT, _REAL, _COUNT = pa.string(), pa.float64(), pa.int32()
 
 
-def _required(name: str, kind: Any) -> Any:
+def _required(name: str, kind: pa.DataType) -> pa.Field:
     return pa.field(name, kind, nullable=False)
 
 
-def _out_of_plane(prefix: str) -> list[Any]:
+def _out_of_plane(prefix: str) -> list[pa.Field]:
     return [pa.field(f"{prefix}{name}", _REAL) for name in ("z", "pitch", "roll")]
 
 
-def _motion(prefix: str) -> list[Any]:
+def _motion(prefix: str) -> list[pa.Field]:
     return [
         pa.field(f"{prefix}motion_vx", _REAL),  # * the label's own velocity, else that of its track
         pa.field(f"{prefix}motion_vy", _REAL),  # *
@@ -68,7 +68,7 @@ def _motion(prefix: str) -> list[Any]:
 SEGMENT_TABLES = ("labels", "objects", "memberships", "sensors")
 """The tables that are split into parts."""
 
-SCHEMAS: dict[str, Any] = {
+SCHEMAS: dict[str, pa.Schema] = {
     # One row a frame.
     "labels": pa.schema(
         [
@@ -128,6 +128,8 @@ SCHEMAS: dict[str, Any] = {
             pa.field("ego_ahead", _REAL),  # *
             _required("ego_distance", _REAL),  # *
             pa.field("relative_heading", _REAL),  # * heading minus the ego's, in (-pi, pi]
+            # * along and beside the ego's course, with how much less and more that may be; null without an end
+            *(pa.field(f"ego_{axis}{end}", _REAL) for axis in ("along", "beside") for end in ("", "_less", "_more")),
             _required("road_directions", pa.list_(_REAL)),  # *
             pa.field("lane", _TEXT),  # *
             pa.field("last_lane", _REAL),  # *

@@ -5,9 +5,6 @@ is written last, so a segment is there completely or not at all. Segments depend
 maps; therefore processes write them side by side, and an interrupted or repeated ingest takes them over as they are.
 """
 
-# pyarrow has no type stubs.
-# pyright: reportAttributeAccessIssue=false
-
 from __future__ import annotations
 
 import hashlib

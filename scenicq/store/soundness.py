@@ -2,47 +2,50 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from scenicq.errors import ScenicqError
 from scenicq.geometry.map_traits import traits_of
+from scenicq.geometry.network import Network
 from scenicq.store.frame_index import frame_hashes, index_rows
+from scenicq.store.manifest import Manifest
 from scenicq.store.map_validation import check_lanes, check_regions
+from scenicq.store.place import Place
+from scenicq.store.regions import MapFiles
 from scenicq.store.rules import PART_COLUMNS, check_frame_index, check_part
 from scenicq.store.schema import SEGMENT_TABLES
 from scenicq.store.validation import check_table, invalid, read_sound
 
-if TYPE_CHECKING:  # which calls this when it is opened
-    from scenicq.store.dataset import Dataset
-
 __all__ = ["check_dataset"]
 
 
-def check_dataset(dataset: Dataset) -> None:
+def check_dataset(place: Place, manifest: Manifest) -> None:
     """Read all of a dataset, one part at a time, and refuse it unless it is sound.
+
+    Args:
+        place: Where its files are.
+        manifest: What its `dataset.json` says.
 
     Raises:
         DataError: dataset-invalid, with file, row and column; store-damaged.
     """
-    manifest = dataset.manifest
-    _check_counts(dataset)
+    _check_counts(manifest)
+    mapped = MapFiles(tuple(map(place.file, manifest.tables["regions"])), manifest.map_groups)
     for table in ("regions", "lanes"):
-        for part, file in zip(manifest.tables[table], dataset.files(table), strict=True):
-            rows = read_sound(table, file, part.path)
+        for part in manifest.tables[table]:
+            rows = read_sound(table, place.file(part), part.path)
             if table == "regions":
                 check_regions(rows, part.path, manifest.maps)
             else:
                 check_lanes(rows, part.path)
     for name in manifest.maps:
         try:
-            found = traits_of(dataset.network(name).features)
+            found = traits_of(Network(name, mapped.features(name)).features)
         except (ScenicqError, MemoryError):
             raise
         except Exception as error:  # noqa: BLE001 - whatever a map that nobody has made by our rules leads to
             invalid(manifest.tables["regions"][0].path, f"map {name} cannot be put together: {error}"[:200])
-        if dataset.mapped.traits(name) not in (found, None):
+        if mapped.traits(name) not in (found, None):
             invalid("dataset.json", f"says of map {name} what its elements do not")
     hashes = [np.empty(0, np.uint64)]
     frames = 0
@@ -50,11 +53,10 @@ def check_dataset(dataset: Dataset) -> None:
     for number in range(len(manifest.tables["labels"])):
         parts = {table: manifest.tables[table][number] for table in SEGMENT_TABLES}
         rows = {
-            table: check_table(table, dataset.place.file(part), part.path, PART_COLUMNS[table])
-            for table, part in parts.items()
+            table: check_table(table, place.file(part), part.path, PART_COLUMNS[table]) for table, part in parts.items()
         }
         names = {table: part.path for table, part in parts.items()}
-        check_part(rows, names, dataset.maps)
+        check_part(rows, names, manifest.named_maps)
         own = set(rows["labels"]["recording"].to_pylist())
         if own & recordings:
             invalid(names["labels"], "a recording is in two parts", column="recording")
@@ -64,12 +66,12 @@ def check_dataset(dataset: Dataset) -> None:
     every = np.concatenate(hashes)
     if frames != manifest.total.frames:
         invalid("dataset.json", f"has {manifest.total.frames} frames, and the tables have {frames}")
-    for part, file in zip(manifest.tables["frame_index"], dataset.files("frame_index"), strict=True):
-        check_frame_index(read_sound("frame_index", file, part.path), index_rows(every), part.path)
+    for part in manifest.tables["frame_index"]:
+        check_frame_index(read_sound("frame_index", place.file(part), part.path), index_rows(every), part.path)
 
 
-def _check_counts(dataset: Dataset) -> None:
-    tables = dataset.manifest.tables
+def _check_counts(manifest: Manifest) -> None:
+    tables = manifest.tables
     counts = {table: len(tables[table]) for table in SEGMENT_TABLES}
     if len(set(counts.values())) != 1:
         told = ", ".join(f"{count} of {table}" for table, count in counts.items())

@@ -19,7 +19,7 @@ from scenicq.geometry.driven_courses import CoursePlace, lane_course
 from scenicq.geometry.network import Network
 from scenicq.store.dataset import Dataset
 from scenicq.store.recorded_tracks import RecordingCourses
-from scenicq.store.row_columns import RowColumns
+from scenicq.store.row_block import RowBlock
 from scenicq.store.tracks import TrackKey
 
 __all__ = ["TrackBlock", "TrackReach", "in_order"]
@@ -87,8 +87,8 @@ class TrackBlock:
             reach: How much of these tracks is asked about; None for all of it.
         """
         self.recorded = dataset.recorded
-        self._labels = RowColumns(dataset.files("labels")[part], [f"ego_{name}" for name in _CODED])
-        self._objects = RowColumns(dataset.files("objects")[part], [*_CODED, "track"])
+        self._labels = RowBlock(dataset.files("labels")[part], texts=[f"ego_{name}" for name in _CODED])
+        self._objects = RowBlock(dataset.files("objects")[part], texts=[*_CODED, "track"])
         self.first_label, self._end = runs[0][0], runs[-1][1]
         self.runs = [(first - self.first_label, end - self.first_label) for first, end in runs]
         n = self._end - self.first_label

@@ -8,13 +8,15 @@ from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
 import numpy as np
+import pyarrow as pa
 from numpy.typing import NDArray
 
 from scenicq.geometry.driven_courses import CoursePlace
 from scenicq.geometry.network import Network
 from scenicq.store.dataset import Dataset
-from scenicq.store.reader import LAST, MOTION_COLUMNS, RowFile
+from scenicq.store.reader import LAST, MOTION_COLUMNS
 from scenicq.store.recorded_tracks import RecordedTracks
+from scenicq.store.row_block import RowBlock
 from scenicq.store.schema import ArrowTable
 
 __all__ = ["RecordingTracks", "TrackKey", "TrackReader"]
@@ -128,11 +130,11 @@ class TrackReader:
         """
         self._recorded = dataset.recorded
         prefixed = [f"ego_{name}" for name in (*_NUMBERS, "attributes")]
-        self._labels = RowFile(
+        self._labels = RowBlock(
             dataset.files("labels")[part],
             ["frame", "recording", "timestamp_us", "object_count", "first_object", "ego_class", *prefixed],
         )
-        self._objects = RowFile(dataset.files("objects")[part], ["id", "track", "attributes", *_NUMBERS])
+        self._objects = RowBlock(dataset.files("objects")[part], ["id", "track", "attributes", *_NUMBERS])
 
     def __enter__(self) -> TrackReader:
         """Nothing is read yet."""
@@ -162,6 +164,6 @@ class TrackReader:
         )
 
 
-def _reals(column: Any) -> Numbers:
+def _reals(column: pa.ChunkedArray) -> Numbers:
     """Null becomes nan."""
     return column.to_numpy().astype(np.float64)

@@ -4,15 +4,12 @@ A text that a dictionary holds once may stand in a million rows, and a buffer of
 takes on disk says little of what it takes in memory.
 """
 
-# pyarrow has no type stubs.
-# pyright: reportAttributeAccessIssue=false
-
 from __future__ import annotations
 
 import struct
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pyarrow as pa
@@ -20,6 +17,9 @@ import pyarrow.compute as pc
 import pyarrow.types as kinds
 
 from scenicq.errors import DataError, Diagnostic
+
+if TYPE_CHECKING:  # not every file is Parquet
+    import pyarrow.parquet as pq
 
 __all__ = ["RECORD_BYTES", "Bound", "check_claims", "decoded_bytes", "feather_batches", "text_columns"]
 
@@ -70,7 +70,7 @@ class Bound:
             raise DataError(Diagnostic("file-invalid", message))
 
 
-def text_columns(parquet: Any) -> list[str]:
+def text_columns(parquet: pq.ParquetFile) -> list[str]:
     """The columns of a Parquet file, nested ones too, that are to be read as dictionaries: texts are there once.
 
     Args:
@@ -80,7 +80,7 @@ def text_columns(parquet: Any) -> list[str]:
     return [leaf.path for leaf in leaves if leaf.physical_type == "BYTE_ARRAY"]
 
 
-def check_claims(parquet: Any, bound: Bound, columns: Sequence[str] | None = None) -> None:
+def check_claims(parquet: pq.ParquetFile, bound: Bound, columns: Sequence[str] | None = None) -> None:
     """Refuse a Parquet file whose own metadata say that its columns are too large.
 
     Args:
@@ -100,7 +100,7 @@ def check_claims(parquet: Any, bound: Bound, columns: Sequence[str] | None = Non
     bound.check(claimed)
 
 
-def decoded_bytes(array: Any, record: int = 0) -> int:
+def decoded_bytes(array: pa.Array, record: int = 0) -> int:
     """Estimate, without decoding it, how many bytes an array takes as objects of Python.
 
     Args:
@@ -128,7 +128,7 @@ def decoded_bytes(array: Any, record: int = 0) -> int:
         elif kinds.is_list(kind) or kinds.is_large_list(kind) or kinds.is_fixed_size_list(kind):
             stack.append(each.flatten())
         elif str(kind) in ("string_view", "binary_view"):
-            views = np.frombuffer(each.buffers()[1], np.int32).reshape(-1, 4)
+            views = np.frombuffer(each.buffers()[1] or b"", np.int32).reshape(-1, 4)
             total += int(views[each.offset : each.offset + len(each), 0].astype(np.int64).sum())
         elif str(kind).startswith(("run_end_encoded", "list_view", "large_list_view")):
             raise pa.ArrowNotImplementedError(f"columns of type {kind} are not read")
@@ -137,7 +137,7 @@ def decoded_bytes(array: Any, record: int = 0) -> int:
     return total
 
 
-def _texts(values: Any) -> Sequence[bytes]:
+def _texts(values: pa.Array) -> Sequence[bytes]:
     """The values of a dictionary, of which only texts have a length."""
     kind = values.type
     if kinds.is_string(kind) or kinds.is_large_string(kind) or kinds.is_binary(kind) or kinds.is_large_binary(kind):
@@ -147,7 +147,7 @@ def _texts(values: Any) -> Sequence[bytes]:
     return [b""] * len(values)
 
 
-def feather_batches(data: bytes, bound: Bound) -> tuple[Any, list[Any]]:
+def feather_batches(data: bytes, bound: Bound) -> tuple[pa.Schema, list[pa.RecordBatch]]:
     """The schema and the record batches of a Feather file; what its buffers unpack to is counted before they do.
 
     Args:

@@ -5,18 +5,16 @@ itself: columns, types, numbers, texts, JSON. `rules` compares tables with each 
 maps. What the writer guarantees needs no such look.
 """
 
-# pyarrow has no type stubs.
-# pyright: reportAttributeAccessIssue=false
-
 from __future__ import annotations
 
 from collections.abc import Collection, Generator, Sequence
 from contextlib import contextmanager
-from typing import Any, NoReturn
+from typing import NoReturn
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
+import pyarrow.parquet as pq
 import pyarrow.types as kinds
 
 from scenicq.errors import DataError, Diagnostic
@@ -125,7 +123,7 @@ def decoding(name: str) -> Generator[None]:
         invalid(name, f"cannot be decoded: {' '.join(str(error).split())[:200]}")
 
 
-def check_columns(parquet: Any, fields: Sequence[Any], names: Sequence[str], name: str) -> None:
+def check_columns(parquet: pq.ParquetFile, fields: Sequence[pa.Field], names: Sequence[str], name: str) -> None:
     """Check the metadata of a file, before anything is decoded.
 
     Args:
@@ -151,7 +149,7 @@ def check_columns(parquet: Any, fields: Sequence[Any], names: Sequence[str], nam
         invalid(name, "would take more than 4 GiB when decoded")
 
 
-def _check_column(field: Any, values: ArrowArray, file: str) -> None:
+def _check_column(field: pa.Field, values: ArrowArray, file: str) -> None:
     name = field.name
     if values.null_count and not field.nullable:
         invalid(file, "there is no value", _first(pc.is_null(values)), name)
@@ -165,7 +163,7 @@ def _check_column(field: Any, values: ArrowArray, file: str) -> None:
         _refuse(pc.less(values, 0), "is negative", file, name)
 
 
-def _check_nested(name: str, kind: Any, values: ArrowArray, file: str) -> None:
+def _check_nested(name: str, kind: pa.DataType, values: ArrowArray, file: str) -> None:
     """What lists and maps hold; of these the row is that among all items."""
     parts = [values.flatten()] if kinds.is_list(kind) else [values.keys, values.items]
     for items in parts:

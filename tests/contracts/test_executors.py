@@ -323,36 +323,34 @@ def test_dask_gives_the_same_and_listens_on_the_loopback_only(dataset: Dataset, 
 
 @pytest.mark.usefixtures("needs_dask")
 @pytest.mark.slow
-def test_no_scheduler_where_one_should_be(dataset: Dataset, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(dask, "_CONNECT_S", 1)
+def test_no_scheduler_where_one_should_be(dataset: Dataset) -> None:
+    patience = dask.DaskPatience(connect_s=1)
     with pytest.raises(DataError, match=r"no Dask scheduler answers at tcp://127.0.0.1:9") as error:
-        list(dask.dask("tcp://127.0.0.1:9")(query(dataset), (), lambda _: None))
+        list(dask.dask("tcp://127.0.0.1:9", patience)(query(dataset), (), lambda _: None))
     assert error.value.diagnostics[0].code == "engine-failed"
 
 
 @pytest.mark.usefixtures("needs_dask")
-def test_a_scheduler_without_workers_ends_in_a_bounded_time(dataset: Dataset, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_scheduler_without_workers_ends_in_a_bounded_time(dataset: Dataset) -> None:
     from distributed import LocalCluster
 
-    monkeypatch.setattr(dask, "_NOBODY_S", 1)
-    monkeypatch.setattr(dask, "_LOOK_S", 0.2)
+    patience = dask.DaskPatience(nobody_s=1, look_s=0.2)
     found = query(dataset)
     with LocalCluster(n_workers=0, host="127.0.0.1", dashboard_address="127.0.0.1:0") as cluster:
         began = time.monotonic()
         with pytest.raises(DataError, match="no worker for 1 s") as error:
-            list(dask.dask(cluster.scheduler_address)(found, partitions(dataset, 6), lambda _: None))
+            list(dask.dask(cluster.scheduler_address, patience)(found, partitions(dataset, 6), lambda _: None))
         assert time.monotonic() - began < 60
     assert error.value.diagnostics[0].code == "engine-failed"
 
 
-def test_a_scheduler_that_does_not_answer_ends_in_a_bounded_time(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_scheduler_that_does_not_answer_ends_in_a_bounded_time() -> None:
     class Stuck:
         def scheduler_info(self, n_workers: int) -> None:
             time.sleep(5)
 
-    monkeypatch.setattr(dask, "_NOBODY_S", 0.1)
-    with pytest.raises(DataError, match="has not answered") as error:
-        dask._workers(Stuck())
+    with pytest.raises(DataError, match=r"has not answered for 0.1 s") as error:
+        dask.count_workers(Stuck(), 0.1)
     assert error.value.diagnostics[0].code == "engine-failed"
 
 

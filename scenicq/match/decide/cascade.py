@@ -32,6 +32,9 @@ __all__ = ["decide"]
 
 def decide(items: list[Item], tolerance: Tolerance) -> Outcome:
     """Decide a group without a solver; `Undecided` with reason "nonlinear" where one is needed."""
+    if not items:
+        # what evaluation has decided needs no time, of which none may be left
+        return Satisfied({})
     try:
         return _Cascade(tolerance).decide(items, {}, 0)
     except Exhausted as error:

@@ -7,8 +7,9 @@ the lanes that can have led there. Such points are no more than draws: what come
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import reduce
 from itertools import combinations
 from typing import TYPE_CHECKING, cast
 
@@ -37,62 +38,136 @@ from scenicq.match.problem.conditioned import Item
 if TYPE_CHECKING:
     from scenicq.match.fields.trials import TrialDraws, TrialSpace
 
-__all__ = ["StepsBack", "draw_back", "steps_back"]
+__all__ = ["DrawsBack", "StepsBack", "steps_back"]
 
 _WAYS = 4
 """Ways back that are followed for each draw."""
+_FOLLOWED = 64
+"""Draws that two ways are looked for in at once."""
 
 _Indices = NDArray[np.intp]
 _Numbers = NDArray[np.float64]
 
 
-def draw_back(ways: Sequence[StepsBack], space: TrialSpace, draws: TrialDraws, rng: np.random.Generator) -> None:
-    """Have points of most draws be such that a way from them leads to what is observed, of some two ways.
+class DrawsBack:
+    """Draws of a search, whose points are such that a way from them leads to what is observed, of some two ways."""
 
-    Args:
-        ways: The ways back.
-        space: What draws are made of.
-        draws: The draws.
-        rng: Random numbers.
+    def __init__(
+        self,
+        ways: Sequence[StepsBack],
+        space: TrialSpace,
+        anywhere: Callable[[int], TrialDraws],
+        rng: np.random.Generator,
+    ) -> None:
+        """Take what is drawn.
 
-    Raises:
-        CannotEvaluate: Geometry cannot tell.
+        Args:
+            ways: The ways back.
+            space: What draws are made of.
+            anywhere: Makes so many draws that lie anywhere.
+            rng: Random numbers.
+        """
+        self._led: dict[int, int] = {}
+        self._ways = ways
+        pairs = [(one, other) for one, other in combinations(ways, 2) if one.leaf is other.leaf]
+        self._parts = [
+            *(_Alone(way, space, rng, self._followed) for way in ways),
+            *(_Together(one, other, space, anywhere, self._followed) for one, other in pairs),
+        ]
+        self._space = space
+        self._rng = rng
+
+    @property
+    def lead_nowhere(self) -> bool:
+        """Whether there is a place to which none of the draws so far leads: more of them would hardly do."""
+        return any(way.is_whole and not self._led.get(id(way), 1) for way in self._ways)
+
+    def _followed(self, way: StepsBack, draws: TrialDraws) -> _Followed:
+        """The ways back of draws, in which everything else is as it is drawn."""
+        found = way.followed(self._space, draws, self._rng, _WAYS * draws.places.shape[1])
+        self._led[id(way)] = self._led.get(id(way), 0) + len(found.draw)
+        return found
+
+    def put_into(self, draws: TrialDraws) -> None:
+        """Have points of most draws be such ones.
+
+        Raises:
+            CannotEvaluate: Geometry cannot tell.
+        """
+        count: int = draws.places.shape[1]
+        for number, part in enumerate(self._parts):
+            part.put_into(draws, np.arange(number, count, len(self._parts) + 1))
+
+
+@dataclass(frozen=True, eq=False)
+class _Alone:
+    """Points from which one way leads to what is observed."""
+
+    way: StepsBack
+    space: TrialSpace
+    rng: np.random.Generator
+    follow: Callable[[StepsBack, TrialDraws], _Followed]
+
+    def put_into(self, draws: TrialDraws, some: _Indices) -> None:
+        """Have points of some draws be such ones; of which there are any."""
+        found = self.follow(self.way, draws.take(some))
+        # one of the ways of each draw, the others do not matter
+        order = self.rng.permutation(len(found.draw))
+        mine, first = np.unique(found.draw[order], return_index=True)
+        chosen = found.take(order[first])
+        draws.places[self.space.hidden[self.way.leaf.identity].rows, some[mine]] = chosen.place.T
+        draws.shares[:, some[mine]] = chosen.shares
+
+
+class _Together:
+    """Points from which two ways lead to what is observed: where they come out closest to each other.
+
+    Many ways are followed at once, and the pairs of them taken one after the other.
     """
-    pairs = [(one, other) for one, other in combinations(ways, 2) if one.leaf is other.leaf]
-    parts = len(ways) + len(pairs) + 1
-    count: int = draws.places.shape[1]
-    mine = {id(way): np.arange(number, count, parts) for number, way in enumerate(ways)}
-    drawn = {id(way): way.draw(space, draws, mine[id(way)], rng) for way in ways}
-    for number, (one, other) in enumerate(pairs, len(ways)):
-        _meet(
-            one,
-            other,
-            space,
-            draws,
-            (drawn[id(one)], drawn[id(other)]),
-            np.arange(number, count, parts),
-        )
 
+    def __init__(
+        self,
+        one: StepsBack,
+        other: StepsBack,
+        space: TrialSpace,
+        anywhere: Callable[[int], TrialDraws],
+        follow: Callable[[StepsBack, TrialDraws], _Followed],
+    ) -> None:
+        self.one = one
+        self.other = other
+        self.space = space
+        self.anywhere = anywhere
+        self.follow = follow
+        self.own, self.uses = other.apart_from(one, space)
+        self.left: TrialDraws | None = None
 
-def _meet(
-    one: StepsBack,
-    other: StepsBack,
-    space: TrialSpace,
-    draws: TrialDraws,
-    drawn: tuple[_Indices, _Indices],
-    some: _Indices,
-) -> None:
-    """Have some draws be those in which the ways from two places come out closest to each other."""
-    rows = space.hidden[one.leaf.identity].rows
-    first, second = (draws.places[rows, each] for each in drawn)
-    away = np.hypot(*(first[:, :, None] - second[:, None, :]))
-    closest = np.argsort(away, axis=None, kind="stable")[: len(some)]
-    left, right = (drawn[axis][each] for axis, each in enumerate(np.unravel_index(closest, away.shape)))
-    some = some[: len(left)]
-    own, uses = other.apart_from(one, space)
-    places, shares = draws.places[:, left], draws.shares[:, left]
-    places[own], shares[uses] = draws.places[own][:, right], draws.shares[uses][:, right]
-    draws.places[:, some], draws.shares[:, some] = places, shares
+    def put_into(self, draws: TrialDraws, some: _Indices) -> None:
+        """Have some draws be such ones."""
+        if self.left is None or not self.left.places.shape[1]:
+            self.left = self._closest()
+        count = self.left.places.shape[1]
+        some = some[:count]
+        chosen = self.left.take(np.arange(len(some)))
+        self.left = self.left.take(np.arange(len(some), count))
+        draws.places[:, some], draws.shares[:, some] = chosen.places, chosen.shares
+
+    def _closest(self) -> TrialDraws:
+        """Draws that two ways make, those first that come out closest."""
+        many = self.anywhere(_FOLLOWED)
+        first, second = self.follow(self.one, many), self.follow(self.other, many)
+        away = np.hypot(*(first.place[:, None] - second.place[None]).transpose(2, 0, 1))
+        if not away.size:
+            return many.take(np.arange(0))
+        # of one way only the closest other one
+        closest = away.argmin(axis=1)
+        left = np.argsort(away[np.arange(len(closest)), closest], kind="stable")
+        right = closest[left]
+        found = many.take(first.draw[left])
+        found.places[self.space.hidden[self.one.leaf.identity].rows] = first.place[left].T
+        found.places[self.own] = many.places[self.own][:, second.draw[right]]
+        found.shares[:] = first.shares[:, left]
+        found.shares[self.uses] = second.shares[self.uses][:, right]
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,6 +180,7 @@ class StepsBack:
         seen: Where that is.
         beyond: The ids of the nodes that hang on the point.
         before: The steps in which the others are interpreted.
+        is_whole: Whether the place hangs on the point whatever choices come out as.
     """
 
     leaf: PointIn
@@ -112,6 +188,7 @@ class StepsBack:
     seen: tuple[float, float]
     beyond: frozenset[int]
     before: Steps
+    is_whole: bool
 
     def apart_from(self, other: StepsBack, space: TrialSpace) -> tuple[_Indices, _Indices]:
         """The coordinates, and the uses of fields, on which this way hangs and another does not."""
@@ -123,22 +200,23 @@ class StepsBack:
         uses = [space.use_of(node) for node in mine if isinstance(node, DirectionAt)]
         return np.array(rows, dtype=np.intp), np.array(uses, dtype=np.intp)
 
-    def draw(self, space: TrialSpace, draws: TrialDraws, some: _Indices, rng: np.random.Generator) -> _Indices:
-        """Have the point of draws be one from which the way leads to what is observed; of which there is one.
+    def followed(self, space: TrialSpace, draws: TrialDraws, rng: np.random.Generator, most: int) -> _Followed:
+        """The ways back of draws, in which everything else is as it is drawn.
 
         Args:
             space: What draws are made of.
             draws: The draws.
-            some: The numbers of those that are meant.
             rng: Random numbers.
+            most: How many ways are followed.
 
         Raises:
             CannotEvaluate: Geometry cannot tell.
         """
-        known, count = space.values(self.before, draws.take(some)), len(some)
-        ends = np.tile(np.array(self.seen), (count, 1))
-        todo = [(self.end, _Followed(np.arange(count), ends, draws.shares[:, some]))]
-        begun: list[_Followed] = []
+        count: int = draws.places.shape[1]
+        known = space.values(self.before, draws)
+        start = _Followed(np.arange(count), np.tile(np.array(self.seen), (count, 1)), draws.shares)
+        todo = [(self.end, start)]
+        begun = [start.take(np.arange(0))]
         while todo:
             node, ways = todo.pop()
             if node is self.leaf:
@@ -158,17 +236,8 @@ class StepsBack:
                     turn = sum((_numbers(known[id(each)], count)[ways.draw] for each in step.turns), np.zeros(1))
                     ahead = rotate_array(_vectors(known[id(step.ahead)], count)[ways.draw], turn)
                     back = _back(step.field, ways, ahead, space.use_of(step.direction))
-                    todo.append((step.inner, back.take(np.sort(rng.permutation(len(back.draw))[: _WAYS * count]))))
-        found: list[_Indices] = [some[:0]]
-        for ways in begun:
-            # one of the ways of each draw, the others do not matter
-            order = rng.permutation(len(ways.draw))
-            mine, first = np.unique(ways.draw[order], return_index=True)
-            chosen = ways.take(order[first])
-            draws.places[space.hidden[self.leaf.identity].rows, some[mine]] = chosen.place.T
-            draws.shares[:, some[mine]] = chosen.shares
-            found.append(some[mine])
-        return np.concatenate(found)
+                    todo.append((step.inner, back.take(np.sort(rng.permutation(len(back.draw))[:most]))))
+        return reduce(_Followed.beside, begun)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -188,6 +257,14 @@ class _Followed:
     def take(self, some: _Indices) -> _Followed:
         """Some of the ways, possibly several times."""
         return _Followed(self.draw[some], self.place[some], self.shares[:, some])
+
+    def beside(self, other: _Followed) -> _Followed:
+        """These ways and others."""
+        return _Followed(
+            np.concatenate([self.draw, other.draw]),
+            np.concatenate([self.place, other.place]),
+            np.concatenate([self.shares, other.shares], axis=1),
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,7 +294,11 @@ def steps_back(items: Sequence[Item], steps: Steps) -> list[StepsBack]:
                 beyond = _hanging_on(leaf, steps)
                 if _leads_back(node, leaf, beyond):
                     before = tuple([step for step in steps if id(step[0]) not in beyond])
-                    found.append(StepsBack(leaf, node, seen, beyond, before))
+                    options = [
+                        each for below in postorder([node]) if isinstance(below, Select) for each in below.options
+                    ]
+                    is_whole = all(id(each) in beyond for each in options)
+                    found.append(StepsBack(leaf, node, seen, beyond, before, is_whole))
     return found
 
 

@@ -15,13 +15,14 @@ from scenicq.errors import CannotEvaluate
 from scenicq.forest.column_domain import ColumnDomain
 from scenicq.forest.columns import DEFINED, UNDEFINED, Column
 from scenicq.forest.interpret import OnMap, Steps, interpret, steps_of
-from scenicq.forest.nodes import Constant, DirectionAt, Feature, Identity, Index, Leaf, Node, Select
-from scenicq.forest.walk import children
+from scenicq.forest.nodes import Constant, DirectionAt, Feature, Identity, Index, Leaf, Node, PointIn, Select
+from scenicq.forest.walk import children, is_leaf, postorder
 from scenicq.limits import LIMITS
 from scenicq.match.fields.contractor import BoxSet
 from scenicq.match.fields.hidden_values import HiddenValue
 from scenicq.match.fields.residuals import Residuals, residuals_of
 from scenicq.match.fields.steps_back import steps_back
+from scenicq.match.problem.conditioned import Item
 
 __all__ = ["Trial", "TrialDraws", "TrialSpace"]
 
@@ -109,6 +110,7 @@ class TrialSpace:
         moving, whole: Which coordinates are numbers of any kind, and which whole ones.
         fields: The uses of fields.
         ways_back: How hidden points follow from what is observed.
+        plain: The constraints on numbers alone.
     """
 
     def __init__(self, start: BoxSet) -> None:
@@ -129,6 +131,8 @@ class TrialSpace:
         self._steps = steps_of(*(node for _, node, _ in network.items))
         self.fields = [node for node, _ in self._steps if isinstance(node, DirectionAt)]
         self.ways_back = steps_back(network.items, self._steps) if self.fields else []
+        self.plain = [item for item in network.items if _is_plain(item)]
+        self._plain_steps = steps_of(*(node for _, node, _ in self.plain))
         self._use = {id(node): number for number, node in enumerate(self.fields)}
         self._only_below: dict[int, list[tuple[int, int]]] = {}
         for select in [node for node, _ in self._steps if isinstance(node, Select) and self.fields]:
@@ -170,6 +174,19 @@ class TrialSpace:
             residuals = residuals_of(self.network.items, known, self.network.tolerance, count)
         pointing = [np.broadcast_to(cast(_Numbers, known[id(node)].data), (count,)) for node in self.fields]
         return Trial(draws, residuals, np.stack([np.empty(count), *pointing])[1:])
+
+    def least_broken(self, draws: TrialDraws, count: int) -> TrialDraws:
+        """Those draws of which conditions on numbers alone miss least.
+
+        Raises:
+            CannotEvaluate: Geometry cannot tell.
+        """
+        if not self.plain:
+            return draws.take(np.arange(count))
+        known = self.values(self._plain_steps, draws)
+        with np.errstate(all="ignore"):
+            missing = residuals_of(self.plain, known, self.network.tolerance, draws.places.shape[1]).missing
+        return draws.take(np.sort(np.argsort(missing, kind="stable")[:count]))
 
     def use_of(self, node: DirectionAt) -> int:
         """The number of a field's use among all."""
@@ -224,3 +241,9 @@ class TrialSpace:
             node: reduce(np.logical_and, [places[row] == option for row, option in options])
             for node, options in self._only_below.items()
         }
+
+
+def _is_plain(item: Item) -> bool:
+    """Whether a constraint hangs on no point and no field, and on something random."""
+    below = list(postorder([item[1]]))
+    return any(map(is_leaf, below)) and not any(isinstance(node, PointIn | OnMap) for node in below)

@@ -24,7 +24,7 @@ from scenicq.limits import LIMITS, limit_exceeded
 from scenicq.match.fields.constraint_network import ConstraintNetwork
 from scenicq.match.fields.contractor import BoxSet
 from scenicq.match.fields.damped_steps import damped_steps
-from scenicq.match.fields.steps_back import draw_back
+from scenicq.match.fields.steps_back import DrawsBack
 from scenicq.match.fields.trials import Trial, TrialDraws, TrialSpace
 from scenicq.match.problem.conditioned import Item
 from scenicq.match.problem.evaluation import replay
@@ -76,6 +76,8 @@ _SHARE = 4
 """A search takes one of so many parts of the trials that are left at most."""
 _STEP = 1e-5
 """By how much a coordinate is moved to see what changes."""
+_PLENTY = 4
+"""So many times more draws are made where some break what is required of numbers alone."""
 _JUMP = 1e3
 """A change per unit above which a field has pointed another way."""
 _FEW, _NARROW = 4, 0.01
@@ -105,6 +107,8 @@ def find_witness(
         if found is not None:
             return found
         trials.left -= search.tried
+        if search.back.lead_nowhere:
+            break
     return None
 
 
@@ -137,6 +141,7 @@ class _Search:
             for variables, picks in outcomes
         ]  # fmt: skip
         self.replayed = 0
+        self.back = DrawsBack(space.ways_back, space, self._evenly, self.rng)
 
     def run(self) -> Satisfied | None:
         """Search, as long as it is worth it."""
@@ -166,7 +171,7 @@ class _Search:
             least = float(elite.residuals.missing.min())
             idle = idle + 1 if least > _PROGRESS * before else 0
             before = min(before, least)
-            if self.replayed >= LIMITS.witness_replays or idle == self.effort.idle:
+            if self.replayed >= LIMITS.witness_replays or idle == self.effort.idle or self.back.lead_nowhere:
                 break
             draws = self._near(elite.draws, _CLOSER**number)
         return None
@@ -189,6 +194,16 @@ class _Search:
         return self.effort.draws if wide else _FEW
 
     def _anywhere(self, count: int) -> TrialDraws:
+        """All over what there is, most where a way leads to what is observed."""
+        draws = self._evenly(count)
+        self.back.put_into(draws)
+        return draws
+
+    def _evenly(self, count: int) -> TrialDraws:
+        """Evenly over all that there is, as far as conditions on numbers alone allow."""
+        return self.space.least_broken(self._drawn((_PLENTY if self.space.plain else 1) * count), count)
+
+    def _drawn(self, count: int) -> TrialDraws:
         """Evenly over all that there is."""
         parts = [each.drawn(self.rng, count) for each in self.space.hidden.values()]
         shares = self.rng.random((len(self.space.fields), count))
@@ -197,7 +212,6 @@ class _Search:
         shares[:, 1::4] *= self.rng.random(shares[:, 1::4].shape) < _OTHER
         draws = TrialDraws(np.concatenate([np.empty((0, count)), *parts]), shares)
         self._choose(draws.places, np.arange(count))
-        draw_back(self.space.ways_back, self.space, draws, self.rng)
         return draws
 
     def _choose(self, places: _Numbers, some: NDArray[np.intp]) -> None:

@@ -21,7 +21,7 @@ import time
 from collections import deque
 from collections.abc import Generator, Iterable, Iterator
 from concurrent.futures import Future
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from itertools import islice
 from pathlib import Path
@@ -37,38 +37,52 @@ from scenicq.query.execution.pieces import DatasetPiece
 from scenicq.query.execution.run import Query
 from scenicq.store.read_lock import Reading, nobody_reads
 
-__all__ = ["dask"]
+__all__ = ["DaskPatience", "count_workers", "dask"]
 
 _LOOPBACK = "127.0.0.1"
 _SCRATCH = "scenicq-dask-"
 _BEGINS_S = 60
 """Seconds after which a folder that nobody uses is one that is left."""
-_CONNECT_S = 20
-_LOOK_S, _NOBODY_S = 2, 60
-"""Seconds between looks for workers, and seconds that none may be there."""
 
 _LATER = ("`--resume` with `-o FILE` goes on where a query stopped",)
 
 
-def dask(address: str | None = None) -> Executor:
+@dataclass(frozen=True, slots=True)
+class DaskPatience:
+    """How long to wait for a cluster.
+
+    Attributes:
+        connect_s: Seconds in which a scheduler must answer first.
+        look_s: Seconds between looks at who is there.
+        nobody_s: Seconds for which no worker may be there, or the scheduler may not answer.
+    """
+
+    connect_s: float = 20
+    look_s: float = 2
+    nobody_s: float = 60
+
+
+def dask(address: str | None = None, patience: DaskPatience | None = None) -> Executor:
     """An executor that runs pieces on Dask.
 
     Args:
         address: Address of a scheduler (`tcp://host:8786`) whose workers have this version of scenicq and see the
             dataset under the same path. By default workers are started on this machine for the time of the query, as
             many as the query's `jobs` or, if that is None, as there are processors.
+        patience: How long to wait for it.
 
     Raises:
         DataError: option-invalid: Dask is not installed.
     """
+    waits = patience or DaskPatience()
     missing = [name for name in ("distributed", "cryptography") if find_spec(name) is None]
     if missing:
         message = f"`--engine dask` needs the package {missing[0]}, which is not installed"
         raise DataError(Diagnostic("option-invalid", message, hints=("`pip install 'scenicq[dask]'` adds it",)))
 
     def run(query: Query, pieces: Iterable[DatasetPiece], progress: Progress) -> Generator[tuple[DatasetPiece, Done]]:
-        with _quiet(), _client(query, address) as client:
-            for piece, done in _run(client, query, pieces):
+        with _quiet(), _client(query, address, waits.connect_s) as client:
+            for piece, done in _run(client, query, pieces, waits):
                 progress(piece.frames)
                 yield piece, done
 
@@ -88,13 +102,13 @@ def _quiet() -> Generator[None]:
 
 
 @contextlib.contextmanager
-def _client(query: Query, address: str | None) -> Generator[Any]:
+def _client(query: Query, address: str | None, connect_s: float) -> Generator[Any]:
     from distributed import Client, LocalCluster  # noqa: PLC0415 - optional, and slow to load
     from distributed.security import Security  # noqa: PLC0415
 
     if address is not None:
         try:
-            client = Client(address, timeout=_CONNECT_S, set_as_default=False)
+            client = Client(address, timeout=connect_s, set_as_default=False)
         except (OSError, ValueError) as error:
             message = f"no Dask scheduler answers at {address}: {str(error).splitlines()[0]}"
             raise DataError(Diagnostic("engine-failed", message)) from error
@@ -148,7 +162,9 @@ def _scratch() -> Generator[str]:
             using.end()
 
 
-def _run(client: Any, query: Query, pieces: Iterable[DatasetPiece]) -> Iterator[tuple[DatasetPiece, Done]]:
+def _run(
+    client: Any, query: Query, pieces: Iterable[DatasetPiece], patience: DaskPatience
+) -> Iterator[tuple[DatasetPiece, Done]]:
     """Hand out a bounded number of pieces ahead, and take what they give in order."""
     from distributed import CancelledError, KilledWorker  # noqa: PLC0415
 
@@ -157,7 +173,7 @@ def _run(client: Any, query: Query, pieces: Iterable[DatasetPiece]) -> Iterator[
     pending: deque[tuple[DatasetPiece, Any]] = deque()
     try:
         while True:
-            room = 3 * max(1, _workers(client)) - len(pending)
+            room = 3 * max(1, count_workers(client, patience.nobody_s)) - len(pending)
             for piece in islice(waiting, max(0, room)):
                 work = client.submit(
                     _work,
@@ -174,7 +190,7 @@ def _run(client: Any, query: Query, pieces: Iterable[DatasetPiece]) -> Iterator[
                 return
             piece, future = pending.popleft()
             try:
-                done = _taken(client, future)
+                done = _taken(client, future, patience)
             except KilledWorker:
                 done = run_frame_by_frame(query, piece)
             future.release()
@@ -187,7 +203,7 @@ def _run(client: Any, query: Query, pieces: Iterable[DatasetPiece]) -> Iterator[
             client.cancel([future for _, future in pending], force=True)
 
 
-def _taken(client: Any, future: Any) -> Done:
+def _taken(client: Any, future: Any, patience: DaskPatience) -> Done:
     """What a piece gave; where nobody is there to do it for long, an error.
 
     Raises:
@@ -196,18 +212,18 @@ def _taken(client: Any, future: Any) -> Done:
     since = time.monotonic()
     while True:
         try:
-            return future.result(timeout=_LOOK_S)
+            return future.result(timeout=patience.look_s)
         except TimeoutError:
-            if _workers(client):
+            if count_workers(client, patience.nobody_s):
                 since = time.monotonic()
-            elif time.monotonic() - since > _NOBODY_S:
-                message = f"the Dask cluster has had no worker for {_NOBODY_S} s"
+            elif time.monotonic() - since > patience.nobody_s:
+                message = f"the Dask cluster has had no worker for {patience.nobody_s:g} s"
                 hints = ("start workers of this scheduler, such as `dask worker ADDRESS`", *_LATER)
                 raise DataError(Diagnostic("engine-failed", message, hints=hints)) from None
 
 
-def _workers(client: Any) -> int:
-    """How many workers the scheduler has.
+def count_workers(client: Any, nobody_s: float) -> int:
+    """How many workers the scheduler of a client has, which answers within some seconds.
 
     Raises:
         DataError: engine-failed: it does not answer, for which the client would wait for ever.
@@ -222,9 +238,9 @@ def _workers(client: Any) -> int:
 
     threading.Thread(target=ask, daemon=True).start()
     try:
-        return answer.result(timeout=_NOBODY_S)
+        return answer.result(timeout=nobody_s)
     except TimeoutError:
-        message = f"the Dask scheduler has not answered for {_NOBODY_S} s"
+        message = f"the Dask scheduler has not answered for {nobody_s:g} s"
         raise DataError(Diagnostic("engine-failed", message, hints=_LATER)) from None
 
 

@@ -53,8 +53,9 @@ class FramesAhead:
 
 
 def telling(
-    found: Iterable[_Verdicts], missed: NDArray[np.int16], block: tuple[int, int], tell: Callable[[Told], None]
-) -> Iterator[_Verdicts]:
+    found: Iterable[_Verdicts], missed: NDArray[np.int16], block: tuple[int, int], tell: Callable[[Told], None],
+    every_s: float = _EVERY_S,
+) -> Iterator[_Verdicts]:  # fmt: skip
     """The verdicts of a block's candidates as they come, telling now and then how far they are.
 
     Args:
@@ -62,10 +63,11 @@ def telling(
         missed: The step of the prefilter that excludes each frame of the block, negative where none does.
         block: First and last frame.
         tell: Takes it to whoever shows progress.
+        every_s: Seconds between what it takes.
     """
     last = time.monotonic()
     for place, verdicts in zip(np.flatnonzero(missed < 0).tolist(), found, strict=False):
         yield verdicts
-        if time.monotonic() - last > _EVERY_S:
+        if time.monotonic() - last > every_s:
             last = time.monotonic()
             tell((*block, place + 1))

@@ -23,13 +23,14 @@ from msgspec import Struct
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.query.execution.records import Record, SummaryRecord, decode_record, json_text
-from scenicq.query.execution.result_summary import ResultCount, ResultSummary, join_summaries
+from scenicq.query.execution.result_summary import ResultCount, ResultSummary, join_summaries, refuse_newer
 from scenicq.query.execution.results import Funnel
 from scenicq.query.execution.run import Query, QueryOptions, RecordingRange
 from scenicq.query.execution.skipped_frames import summarize
-from scenicq.store.atomic_files import made_folder, whole_file
+from scenicq.store.atomic_files import whole_file
 from scenicq.store.dataset import Dataset
 from scenicq.store.remote_path import AnyPath
+from scenicq.store.targets import target_of
 
 __all__ = ["DatasetPiece", "Gathered", "find_finished", "fingerprint", "gather", "partitions", "write_piece"]
 
@@ -134,7 +135,7 @@ def write_piece(
     """
     target = folder / _name(question, piece.number, piece.count)
     try:
-        with made_folder(folder), whole_file(target) as file:
+        with target_of(folder).made_folder(), whole_file(target) as file:
             counted = ResultCount()
             for each in counted.counted(records):
                 file.write((json_text(each) + "\n").encode())
@@ -191,6 +192,7 @@ def _piece(path: AnyPath) -> _Piece:
     """The results in a file, and what was counted."""
     try:
         *lines, last = path.read_bytes().splitlines() or [b""]
+        refuse_newer(str(path), last)
         counts = msgspec.json.decode(last, type=_Counts)
         there = (*_COUNTS, *(name for name in _LATER if name in counts.funnel))
         funnel = Funnel(**{name: _counted(counts.funnel[name]) for name in there})
@@ -214,7 +216,8 @@ def gather(folder: AnyPath, question: str | None = None, *, only: int | None = N
         only: The number of a single piece, from 0; all of them by default.
 
     Raises:
-        DataError: file-missing, naming the pieces that are missing; file-invalid for pieces of several questions.
+        DataError: file-missing, naming the pieces that are missing; file-invalid for pieces of several questions;
+            results-version for those that a newer program wrote.
     """
     found = _files(folder)
     questions = sorted({path.name.rsplit("-", 3)[0] for path in found})

@@ -11,9 +11,10 @@ from scenicq.errors import DataError, Diagnostic, Source
 from scenicq.query.execution.pieces import fingerprint
 from scenicq.query.execution.program_files import SiblingFiles, program_text
 from scenicq.query.execution.run import Query, QueryOptions
-from scenicq.store.atomic_files import made_folder, write_whole
+from scenicq.store.atomic_files import write_whole
 from scenicq.store.dataset import open_dataset
 from scenicq.store.remote_path import AnyPath
+from scenicq.store.targets import target_of
 
 __all__ = ["name_question", "note_question", "noted_question"]
 
@@ -47,7 +48,7 @@ def note_question(folder: AnyPath, query: Query) -> None:
     path = str(query.siblings.path.resolve())
     note = _Note(query.dataset.address, query.source.name, query.source.text, path, query.options)
     try:
-        with made_folder(folder):
+        with target_of(folder).made_folder():
             write_whole(file, msgspec.json.encode(note).decode() + "\n")
     except UnicodeEncodeError:
         message = f"{file} cannot be written: the path {path} is not text in UTF-8"

@@ -3,10 +3,6 @@
 What is recorded over an interval has six columns: `recorded.gap.first`, `last`, `minimum`, `maximum`, `mean`, `values`.
 """
 
-# pyarrow has no type stubs.
-# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
-# pyright: reportUnknownArgumentType=false, reportUnknownParameterType=false
-
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence

@@ -1,9 +1,5 @@
 """The files that `scenicq match -o` writes, read back: JSON lines, CSV or Parquet, by the extension."""
 
-# pyarrow has no type stubs.
-# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
-# pyright: reportUnknownArgumentType=false
-
 from __future__ import annotations
 
 import csv
@@ -21,8 +17,8 @@ from scenicq.errors import DataError, Diagnostic
 from scenicq.query.execution.csv_cells import unquote_cell
 from scenicq.query.execution.recorded_columns import is_cell, read_cells
 from scenicq.query.execution.records import DENSITY, Record, SummaryRecord, decode_record, record_of
-from scenicq.query.execution.result_summary import Completeness, ResultSummary, join_summaries
-from scenicq.query.execution.result_tables import METADATA, read_row, read_summary
+from scenicq.query.execution.result_summary import Completeness, ResultSummary, join_summaries, refuse_newer
+from scenicq.query.execution.result_tables import METADATA, read_row, read_summary, stated_summary
 from scenicq.store.remote_path import AnyPath
 from scenicq.store.unpacked import RECORD_BYTES, Bound, check_claims, decoded_bytes, text_columns
 
@@ -34,6 +30,7 @@ _NEEDED = ("frame", "recording", "verdict", "timestamp_us", "correspondence", "c
            "start_us", "end_us", "frames")  # fmt: skip
 """What tells what became of a result."""
 _NESTED = ("correspondence", "cause", "sensors", "witness", "lanes", "frames", "timeline", "unrecorded", "summary")
+_SUMMARY = '"summary"'
 _LONGEST = 10_000_000
 """Characters of a cell of CSV."""
 
@@ -55,7 +52,7 @@ def read_results(path: AnyPath) -> ReadResults:
     """The results in a file by name; of several of one frame the first match counts.
 
     Raises:
-        DataError: file-missing, or file-invalid.
+        DataError: file-missing, file-invalid, or results-version.
     """
     found: dict[str, Record] = {}
     records = RecordStream(_records(path, _NEEDED))
@@ -70,7 +67,7 @@ def read_records(path: AnyPath) -> RecordStream:
     """All results in a file with all that they say: of frames, or of intervals of recordings.
 
     Raises:
-        DataError: file-missing, or file-invalid; as the results are taken.
+        DataError: file-missing, file-invalid, or results-version; as the results are taken.
     """
     return RecordStream(_records(path, None))
 
@@ -142,14 +139,21 @@ def _read(path: AnyPath, where: str, read: Callable[[], _T]) -> _T:
 
 
 def _of_lines(path: AnyPath, text: str) -> Iterator[Record | SummaryRecord]:
-    for number, line in enumerate(text.split("\n"), 1):
+    lines = text.split("\n")
+    refuse_newer(str(path), next(filter(str.strip, reversed(lines)), ""))
+    for number, line in enumerate(lines, 1):
         if line.strip():
+            # files may have been put together
+            if _SUMMARY in line:
+                refuse_newer(str(path), line)
             yield _read(path, f"line {number}", lambda line=line: decode_record(line))
 
 
 def _of_csv(path: AnyPath, text: str) -> Iterator[Record | SummaryRecord]:
     limit = csv.field_size_limit(_LONGEST)
     try:
+        for summary in _summaries(text):
+            refuse_newer(str(path), f'{{"summary": {summary}}}')
         rows = csv.DictReader(io.StringIO(text, newline=""), strict=True)
         for number, row in enumerate(rows, 1):
             yield _read(path, f"row {number}", lambda row=row: record_of(_values(row)))
@@ -157,6 +161,15 @@ def _of_csv(path: AnyPath, text: str) -> Iterator[Record | SummaryRecord]:
         raise _invalid(path, f"it is not CSV: {error}") from None
     finally:
         csv.field_size_limit(limit)
+
+
+def _summaries(text: str) -> Iterator[str]:
+    """The summaries in a file of CSV: one, unless files have been put together."""
+    rows = csv.reader(io.StringIO(text, newline=""), strict=True)
+    header = next(rows, list[str]())
+    if "summary" in header:
+        place = header.index("summary")
+        yield from (row[place] for row in rows if len(row) > place and row[place])
 
 
 def _values(row: Mapping[str, Any]) -> dict[str, Any]:
@@ -185,6 +198,7 @@ def _of_parquet(path: AnyPath, data: bytes, columns: tuple[str, ...] | None) -> 
             bound.check(RECORD_BYTES * parquet.metadata.num_rows)
             texts = text_columns(parquet)
             metadata = parquet.metadata.metadata
+        refuse_newer(str(path), stated_summary(metadata))
         table = pq.read_table(pa.BufferReader(data), columns=chosen, read_dictionary=texts)
         for chunk in (chunk for column in table.columns for chunk in column.chunks):
             bound.add(decoded_bytes(chunk))

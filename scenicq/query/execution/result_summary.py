@@ -11,14 +11,26 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
+import msgspec
 from msgspec import UNSET, Struct, UnsetType
 
-from scenicq.errors import Diagnostic
+from scenicq.errors import DataError, Diagnostic
 
 if TYPE_CHECKING:
     from scenicq.query.execution.records import Record
 
-__all__ = ["Completeness", "ResultCount", "ResultSummary", "Stretch", "join_summaries"]
+__all__ = [
+    "RESULT_VERSION",
+    "Completeness",
+    "ResultCount",
+    "ResultSummary",
+    "Stretch",
+    "join_summaries",
+    "refuse_newer",
+]
+
+RESULT_VERSION = 1
+"""Changes where a reader of before would take results for something else, not where a field is only added."""
 
 End = Literal["deadline", "limit"]
 """What ends a query before all frames are looked at."""
@@ -54,6 +66,7 @@ class ResultSummary(Struct, frozen=True, omit_defaults=True, kw_only=True):
     """How a result was made, and what it does not say.
 
     Attributes:
+        version: That of results; 0 where none is stated, as by those of before.
         complete: Whether every frame was looked at, and all that was found is there.
         results: How many results there are.
         frames: How many frames were asked about.
@@ -70,6 +83,7 @@ class ResultSummary(Struct, frozen=True, omit_defaults=True, kw_only=True):
         variables: What the program says at the place of each random variable of its author's, for readers of witnesses.
     """
 
+    version: int = 0
     complete: bool
     results: int
     frames: int
@@ -117,6 +131,7 @@ def join_summaries(parts: Sequence[ResultSummary]) -> ResultSummary | None:
         unknown.update(each.unknown)
     sampled = [each for each in parts if each.sample is not UNSET]
     return ResultSummary(
+        version=RESULT_VERSION,
         complete=all(each.complete for each in parts),
         results=sum(each.results for each in parts),
         frames=sum(each.frames for each in parts),
@@ -131,6 +146,34 @@ def join_summaries(parts: Sequence[ResultSummary]) -> ResultSummary | None:
         skipped=tuple(stretch for each in parts for stretch in each.skipped),
         variables={place: text for each in parts for place, text in each.variables.items()},
     )
+
+
+class _Stated(Struct, frozen=True):
+    version: int = 0
+
+
+class _Line(Struct, frozen=True):
+    summary: _Stated = _Stated()
+
+
+def refuse_newer(name: str, line: str | bytes) -> None:
+    """Refuse results of a version that this program does not know, before anything else of them is read.
+
+    Args:
+        name: What messages call the results.
+        line: What carries their summary, as JSON; what holds none says nothing, and is for its reader to refuse.
+
+    Raises:
+        DataError: results-version.
+    """
+    try:
+        version = msgspec.json.decode(line, type=_Line).summary.version
+    except (msgspec.DecodeError, RecursionError):
+        return
+    if version > RESULT_VERSION:
+        message = f"{name} holds results of version {version}; this program reads versions up to {RESULT_VERSION}"
+        hints = ("a newer scenicq reads them", "else run the query again")
+        raise DataError(Diagnostic("results-version", message, hints=hints))
 
 
 @dataclass(slots=True)

@@ -12,10 +12,6 @@ timeline         list     what roles do from when to when: kind, of, mode (what,
 The dataset and the summary stand in the metadata.
 """
 
-# pyarrow has no type stubs.
-# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
-# pyright: reportUnknownArgumentType=false, reportUnknownParameterType=false
-
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -37,7 +33,16 @@ from scenicq.query.execution.records import (
 )
 from scenicq.query.execution.result_summary import ResultSummary
 
-__all__ = ["METADATA", "read_row", "read_summary", "result_schema", "result_table", "roles_of", "summary_metadata"]
+__all__ = [
+    "METADATA",
+    "read_row",
+    "read_summary",
+    "result_schema",
+    "result_table",
+    "roles_of",
+    "stated_summary",
+    "summary_metadata",
+]
 
 METADATA = b"scenicq.dataset"
 """Key of the metadata, under which the dataset stands."""
@@ -120,6 +125,12 @@ def result_table(records: Iterable[Record], schema: pa.Schema) -> pa.Table:
 def summary_metadata(summary: ResultSummary) -> dict[bytes, bytes]:
     """The metadata that says a summary."""
     return {_SUMMARY: json_text(summary).encode()}
+
+
+def stated_summary(metadata: Mapping[bytes, bytes] | None) -> bytes:
+    """What metadata say of all results, as a line of JSON that carries it and is no result; b"" for nothing."""
+    text = (metadata or {}).get(_SUMMARY)
+    return b"" if text is None else b'{"summary": %b}' % text
 
 
 def read_summary(metadata: Mapping[bytes, bytes] | None) -> ResultSummary | None:

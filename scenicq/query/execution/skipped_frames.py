@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from msgspec import UNSET, UnsetType
 
-from scenicq.query.execution.result_summary import End, ResultCount, ResultSummary, Stretch
+from scenicq.query.execution.result_summary import RESULT_VERSION, End, ResultCount, ResultSummary, Stretch
 from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import MAP_LACKS, Query
 from scenicq.query.execution.variable_texts import variable_texts
@@ -39,6 +39,7 @@ def summarize(query: Query, count: ResultCount) -> ResultSummary:
         unknown = sample.unknown
     chosen = funnel.chosen
     return ResultSummary(
+        version=RESULT_VERSION,
         complete=complete and not (chosen and chosen.left_out),
         results=count.results,
         frames=sum(query.frames(name) for name in query.dataset.maps),

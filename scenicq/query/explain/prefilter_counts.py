@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from scenicq.limits import LIMITS
 from scenicq.query.execution.run import Query
 from scenicq.query.prefilter.executor import Block, run_prefilter
 from scenicq.query.prefilter.plan import Plan
@@ -68,7 +69,9 @@ def spots(blocks: list[Block], most: int = _SPOTS) -> Iterator[Block]:
         block = blocks[place * len(blocks) // count]
         step = max(1, (block.end - block.first) // each)
         for first in range(block.first, block.end, step):
-            yield replace(block, first=first, end=min(first + _SPOT_FRAMES, first + step, block.end))
+            # what would be looked at as a whole is enough for a sample
+            frames = min(_SPOT_FRAMES, step, LIMITS.advice_frames)
+            yield replace(block, first=first, end=min(first + frames, block.end))
 
 
 def _missed(query: Query, connection: duckdb.DuckDBPyConnection, plan: Plan, blocks: Iterable[Block]) -> list[int]:

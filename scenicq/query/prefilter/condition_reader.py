@@ -18,6 +18,7 @@ from scenicq.forest.ego_frame import DISTANCE, PLACE, in_ego_frame
 from scenicq.forest.groups import Comparison
 from scenicq.forest.interval_values import Interval, IntervalVector
 from scenicq.forest.nodes import (
+    COURSE,
     GOING,
     LAST_LANE,
     Arithmetic,
@@ -39,9 +40,11 @@ from scenicq.forest.nodes import (
 )
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.walk import conjuncts, features
+from scenicq.geometry.driven_courses import GAP_S
 from scenicq.geometry.regions import Everywhere, IntersectionOf, Region
 from scenicq.geometry.road_direction import RoadDirection
 from scenicq.limits import LIMITS
+from scenicq.match.problem.observation import course_rules
 from scenicq.match.tolerance import SLACK, Tolerance
 from scenicq.query.prefilter.map_relations import (
     MapRelations,
@@ -52,7 +55,7 @@ from scenicq.query.prefilter.map_relations import (
 )
 from scenicq.query.prefilter.regions import near_region, nearest_box
 from scenicq.query.prefilter.said_columns import in_said_truths, said_columns
-from scenicq.query.prefilter.sql_bounds import ARITHMETIC, SqlBounds
+from scenicq.query.prefilter.sql_bounds import ARITHMETIC, ON_EGO_COURSE, SqlBounds
 from scenicq.query.prefilter.sql_ends import (
     SQL,
     Expr,
@@ -68,7 +71,7 @@ from scenicq.query.prefilter.sql_ends import (
 from scenicq.store.reader import LAST
 from scenicq.store.schema import MEMBERSHIP_RADIUS_M
 
-__all__ = ["EGO", "ColumnCondition", "ConditionReader", "object_columns"]
+__all__ = ["EGO", "ColumnCondition", "ConditionReader", "course_column", "object_columns"]
 
 EGO = "ego"
 """Alias of the frame's row; the objects of a condition are called `a` and, if there are two, `b`."""
@@ -76,6 +79,8 @@ EGO = "ego"
 _NUMBERS = ("heading", "width", "length", "height")
 _AT_THE_PLACE = -2 * SLACK
 """How far a place may be from a bound for it to be surely on the right side, where comparisons allow for slack."""
+_NO_END = 1e300
+"""What no measure is beyond; products of it with 0 are numbers, as those of infinity are not."""
 _NO_TURN = -1.0
 """No lane leads as little from any heading."""
 
@@ -116,7 +121,18 @@ def object_columns(alias: str, prefix: str = "") -> dict[str, str | tuple[str, s
     found[GOING], found[LAST_LANE] = f"{start}heading", f"{start}{LAST}"
     if not prefix:
         found[PLACE], found[DISTANCE] = (f"{start}ego_right", f"{start}ego_ahead"), f"{start}ego_distance"
+        for name, column in zip(ON_EGO_COURSE, ("ego_along", "ego_beside"), strict=True):
+            known = f"{start}{column}"
+            found[name] = (
+                f"coalesce({known} - {known}_less, {-_NO_END})", f"coalesce({known} + {known}_more, {_NO_END})"
+            )  # fmt: skip
     return found
+
+
+def course_column(scenario: Scenario) -> dict[tuple[int, str], str]:
+    """A mark that objects have columns on the ego's course: a program cuts it at the same gaps as an ingest did."""
+    rules = course_rules(scenario).get(scenario.ego)
+    return {(scenario.ego, COURSE): ""} if rules is not None and rules.gap_s == GAP_S else {}
 
 
 @dataclass(slots=True)
@@ -442,6 +458,7 @@ class ConditionReader:
             attributes = {index: f"{alias}.{prefix}attributes" for index, (alias, prefix) in aliases.items()}
             own = [(index, name) for index in aliases for name in self.scenario.objects[index].properties]
             columns |= said_columns(self._said, attributes, own)
+            columns |= course_column(self.scenario)
             self._bounds[objects] = SqlBounds(columns, self._nearest)
         return self._bounds[objects]
 

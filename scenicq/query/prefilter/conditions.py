@@ -18,7 +18,13 @@ from scenicq.forest.walk import conjuncts, postorder
 from scenicq.geometry.network import Network
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.constraints import build_groups, compared_properties, relevant_properties
-from scenicq.query.prefilter.condition_reader import EGO, ColumnCondition, ConditionReader, object_columns
+from scenicq.query.prefilter.condition_reader import (
+    EGO,
+    ColumnCondition,
+    ConditionReader,
+    course_column,
+    object_columns,
+)
 from scenicq.query.prefilter.map_relations import (
     MapRelations,
     MeantElements,
@@ -93,48 +99,53 @@ def sufficient_conditions(
     tolerance = options.tolerance.for_scenario(scenario)
     reader = ConditionReader(scenario, tolerance, relations, network.roadDirection, proving=True, radius=options.radius)
     relevant = relevant_properties(scenario, options)
-    found = list(_without_attributes(scenario, options, relevant))
     told = [
-        frozenset(name for name in names if name in _COLUMNED or is_only_observed(scenario, index, name))
-        for index, names in enumerate(relevant)
+        frozenset(name for name in names if _has_column(scenario, index, name)) for index, names in enumerate(relevant)
     ]
+    found = list(_without_attributes(scenario, options, [a - b for a, b in zip(relevant, told, strict=True)]))
     signature = (*told, frozenset[str]())
     for group in build_groups(scenario, signature, options):
-        found += _proof(group, reader, scenario.ego, options.classes)
+        found += _proof(group, reader, scenario, options.classes)
     if any(each.sql is False for each in found):
         return None
     return tuple(each for each in found if each.region or each.sql is not True)
 
 
+def _has_column(scenario: Scenario, index: int, name: str) -> bool:
+    """Whether a property is read from a column, or is never taken for granted as labels alone tell it."""
+    read = name in _COLUMNED or (index, name) in course_column(scenario)
+    return read or is_only_observed(scenario, index, name)
+
+
 def _without_attributes(
-    scenario: Scenario, options: MatchOptions, relevant: Sequence[frozenset[str]]
+    scenario: Scenario, options: MatchOptions, without_columns: Sequence[frozenset[str]]
 ) -> Iterator[ColumnCondition]:
     """That a label has an ego and nothing that is compared but what has columns."""
     yield ColumnCondition((), f"{EGO}.ego_class <> ''")
-    for index, names in enumerate(relevant):
-        # what labels alone tell is read, not taken for granted
-        others = sorted(name for name in names - _COLUMNED if not is_only_observed(scenario, index, name))
-        if others and index == scenario.ego:
-            yield ColumnCondition((), _lacks(f"{EGO}.ego_attributes", others))
-        elif others:
-            yield ColumnCondition((index,), _lacks("a.attributes", others))
+    for index, names in enumerate(without_columns):
+        if names and index == scenario.ego:
+            yield ColumnCondition((), _lacks(f"{EGO}.ego_attributes", sorted(names)))
+        elif names:
+            yield ColumnCondition((index,), _lacks("a.attributes", sorted(names)))
     params = [name for name, given in scenario.params.items() if given.explicit and name not in options.ignore_params]
     if params:
         yield ColumnCondition((), _lacks(f"{EGO}.params", params))
 
 
-def _proof(group: Group, reader: ConditionReader, ego: int, classes: Granularity) -> Iterator[ColumnCondition]:
+def _proof(
+    group: Group, reader: ConditionReader, scenario: Scenario, classes: Granularity
+) -> Iterator[ColumnCondition]:
     """What proves that all constraints of a group can be satisfied together."""
     comparisons = [each for each in group.constraints if isinstance(each, Comparison)]
     along = next((each for each in comparisons if any(_is_told_by(each, place) for place in comparisons)), None)
     if len(comparisons) > 1 + (along is not None) or any(each.object == PARAMS for each in comparisons):
         yield ColumnCondition((), False)
         return
-    meant = _meant_elements(group, ego)
+    meant = _meant_elements(group, scenario.ego)
     for constraint in group.constraints:
         if isinstance(constraint, Condition):
             for part in conjuncts(constraint.expression):
-                sql = proof(part, ego, classes)
+                sql = proof(part, scenario, classes)
                 if sql is None:
                     yield from reader.requirement(part, meant)
                 else:

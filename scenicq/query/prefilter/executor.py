@@ -3,10 +3,6 @@
 A block is a run of frames in one part of the store, so memory depends on the size of a part, never on the dataset's.
 """
 
-# pyarrow has no type stubs.
-# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
-# pyright: reportUnknownArgumentType=false
-
 from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
@@ -22,6 +18,7 @@ from numpy.typing import NDArray
 from scenicq.query.prefilter.decision import new_table
 from scenicq.query.prefilter.plan import LABELS, MEMBERSHIPS, OBJECTS, PASSED, SENSORS, Plan
 from scenicq.store.dataset import Dataset
+from scenicq.store.in_memory import fetch_columns
 from scenicq.store.sql import sql_text
 
 if TYPE_CHECKING:
@@ -445,7 +442,7 @@ def run_players(
     """
     _name(connection, plan)
     views = ", ".join(f"{view} AS ({sql})" for view, sql in _rows_of(dataset, connection, block))
-    found: Any = connection.execute(f"WITH {views} {plan.players}").fetchnumpy()
+    found = fetch_columns(connection.execute(f"WITH {views} {plan.players}"))
     order = np.argsort(found["row"], kind="stable")
     return {name: np.asarray(each)[order] for name, each in found.items()}
 
@@ -477,7 +474,7 @@ def run_plan(
     asked = list(islice(views, 1))
     _name(connection, plan)
     rows = "".join(f"WITH {view} AS ({sql}) " for view, sql in asked)
-    found: Any = connection.execute(rows + plan.columns).fetchnumpy()
+    found = fetch_columns(connection.execute(rows + plan.columns))
     order = np.argsort(found["f"])
     numbers, missed = found["f"][order], found["missed"][order].astype(np.int16)
     left = numbers[missed < 0]
@@ -489,7 +486,8 @@ def run_plan(
         for statement in stage.statements:
             connection.execute(statement)
         if place:
-            found = connection.execute(f"SELECT f, coalesce(missed, -1) AS missed FROM {stage.table}").fetchnumpy()
+            kept = connection.execute(f"SELECT f, coalesce(missed, -1) AS missed FROM {stage.table}")
+            found = fetch_columns(kept)
             missed[np.searchsorted(numbers, found["f"])] = found["missed"]
             if not (missed < 0).any():
                 break

@@ -31,7 +31,7 @@ from scenicq.forest.nodes import (
 )
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.walk import conjuncts, features, transform
-from scenicq.query.prefilter.condition_reader import EGO, object_columns
+from scenicq.query.prefilter.condition_reader import EGO, course_column, object_columns
 from scenicq.query.prefilter.said_columns import in_said_truths, said_columns
 from scenicq.query.prefilter.sql_bounds import SqlBounds
 from scenicq.query.prefilter.sql_ends import SQL, SqlTruth
@@ -72,20 +72,20 @@ def other_conditions(scenario: Scenario, classes: Granularity) -> Iterator[Other
     """
     for requirement in scenario.requirements:
         for part in conjuncts(requirement.condition):
-            found = _read(part, scenario.ego, classes, proving=False)
+            found = _read(part, scenario, classes, proving=False)
             if found is not None:
                 yield OtherCondition(*found, requirement.span)
 
 
-def proof(part: Node, ego: int, classes: Granularity) -> str | None:
+def proof(part: Node, scenario: Scenario, classes: Granularity) -> str | None:
     """SQL over a frame `ego` that proves a condition on label objects; None where SQL cannot tell.
 
     Args:
         part: The condition.
-        ego: The index of the ego, which is that of the label.
+        scenario: The scenario; the ego is that of the label.
         classes: How classes are compared.
     """
-    found = _read(part, ego, classes, proving=True)
+    found = _read(part, scenario, classes, proving=True)
     if found is None:
         return None
     counted, at_least, most = found
@@ -93,8 +93,9 @@ def proof(part: Node, ego: int, classes: Granularity) -> str | None:
     return f"(SELECT count(*) FROM {OBJECTS} {OTHER} WHERE {OTHER}.frame = {EGO}.frame AND {counted}) {few}"
 
 
-def _read(part: Node, ego: int, classes: Granularity, *, proving: bool) -> tuple[str, int | None, int] | None:
+def _read(part: Node, scenario: Scenario, classes: Granularity, *, proving: bool) -> tuple[str, int | None, int] | None:
     """What counts and how many must, or may; None where SQL cannot tell."""
+    ego = scenario.ego
     negated = isinstance(part, Logic) and part.op is LogicOp.NOT
     node = part.args[0] if isinstance(part, Logic) and negated else part
     if not isinstance(node, Among) or node.op not in (AmongOp.AT_LEAST, AmongOp.EVERY):
@@ -103,7 +104,7 @@ def _read(part: Node, ego: int, classes: Granularity, *, proving: bool) -> tuple
     if {index for index, _ in features(*given)} - {ego} or (every and negated):
         return None
     columns = {(ELEMENT, name): column for name, column in object_columns(OTHER).items()}
-    columns |= {(ego, name): column for name, column in object_columns(EGO, "ego_").items()}
+    columns |= {(ego, name): column for name, column in object_columns(EGO, "ego_").items()} | course_column(scenario)
 
     def put_in(each: Node) -> Node:
         if isinstance(each, Feature) and each.object == GIVEN:

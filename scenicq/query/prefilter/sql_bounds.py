@@ -19,10 +19,12 @@ from scenicq.forest.interpret import OnMap, RegionNode, interpret, steps_of
 from scenicq.forest.interval_values import Interval, IntervalValue, IntervalVector, Truth
 from scenicq.forest.intervals import IntervalDomain
 from scenicq.forest.nodes import (
+    COURSE,
     Among,
     ArithmeticOp,
     CompareOp,
     Constant,
+    CourseCoordinate,
     DiscreteRange,
     Distance,
     Feature,
@@ -39,7 +41,10 @@ from scenicq.limits import LIMITS
 from scenicq.match.tolerance import SLACK
 from scenicq.query.prefilter.sql_ends import SQL, Expr, any_of
 
-__all__ = ["ARITHMETIC", "Columns", "SqlBounds"]
+__all__ = ["ARITHMETIC", "ON_EGO_COURSE", "Columns", "SqlBounds"]
+
+ON_EGO_COURSE = ("along the ego's course", "beside the ego's course")
+"""Features of label objects that programs cannot name, by axis: pairs of the ends between which they are."""
 
 
 class Alternatives(NamedTuple):
@@ -118,8 +123,24 @@ class SqlBounds:
             domain = IntervalDomain(SQL, self._column, slack=SLACK, boxed=False)
             # what is known by its id must stay: another node would get the id, and with it the bounds
             self._kept.append(root)
-            self._known = interpret(steps_of(root), _Alternatives(domain, self._distance), self._known)
+            self._known = interpret(steps_of(root), _Alternatives(domain, self._on_map), self._known)
         return self._known[id(root)]
+
+    def _on_map(self, node: OnMap, args: Sequence[Alternatives]) -> Alternatives | None:
+        """Bounds of what hangs on the map; None where nothing is known."""
+        return self._on_course(node) if isinstance(node, CourseCoordinate) else self._distance(node, args)
+
+    def _on_course(self, node: CourseCoordinate) -> Alternatives | None:
+        """The ends between which an object is along, or beside, the course of the ego."""
+        owner, place = node.course, node.point
+        if not (isinstance(owner, Feature) and isinstance(place, Feature) and owner.current == place.current):
+            return None
+        if place.property != "position" or (owner.object, owner.property) not in self.columns:
+            return None
+        ends = self.columns.get((place.object, ON_EGO_COURSE[node.axis]))
+        if not isinstance(ends, tuple):
+            return None
+        return Alternatives((Interval(*ends) if node.end is None else SQL.known(ends[node.end]),))
 
     def _distance(self, node: OnMap, args: Sequence[Alternatives]) -> Alternatives | None:
         """Bounds of the distance from a known point to a region of the map."""
@@ -133,7 +154,7 @@ class SqlBounds:
         return None if low is None else Alternatives((Interval(low, math.inf),))
 
     def _column(self, node: Feature) -> IntervalValue[Expr]:
-        column = self.columns.get((node.object, node.property))
+        column = None if node.property == COURSE else self.columns.get((node.object, node.property))
         if isinstance(column, tuple):
             return IntervalVector(*map(SQL.known, column))
         if column is not None and node.kind == "boolean":

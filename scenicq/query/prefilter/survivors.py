@@ -1,9 +1,5 @@
 """What a plan leaves of a block: its labels, and who may play which role in them."""
 
-# pyarrow has no type stubs.
-# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
-# pyright: reportUnknownArgumentType=false
-
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
@@ -17,6 +13,7 @@ from numpy.typing import NDArray
 from scenicq.forest.nodes import COURSE, LAST_LANE
 from scenicq.match.problem.observation import IN_COLUMNS
 from scenicq.query.prefilter.plan import LABELS, OBJECTS, SENSORS, Plan
+from scenicq.store.in_memory import fetch_columns
 from scenicq.store.labels import Label
 from scenicq.store.reader import LABEL_COLUMNS, LAST, MOTION_COLUMNS, OBJECT_COLUMNS, assemble
 from scenicq.store.recorded_tracks import RecordedTracks
@@ -77,8 +74,8 @@ def candidate_rows(connection: duckdb.DuckDBPyConnection, plan: Plan) -> Candida
     assert plan.roles
     left = f"(SELECT f FROM {plan.stages[-1].table} WHERE missed IS NULL)"
     roles = ", ".join(f"r{place}" for place in range(len(plan.roles)))
-    found: Any = connection.execute(f"SELECT row, {roles} FROM roles WHERE f IN {left} ORDER BY row").fetchnumpy()
-    return CandidateRows.of(found, len(plan.roles))
+    found = connection.execute(f"SELECT row, {roles} FROM roles WHERE f IN {left} ORDER BY row")
+    return CandidateRows.of(fetch_columns(found), len(plan.roles))
 
 
 def candidates(

@@ -316,11 +316,12 @@ class Simulation:
                     return set(), True
                 if over:
                     return {self.at}, True
+                # a run may end here as a match and be rejected by what a behavior requires next
+                self.running[self.at] = set(self._that_run(top, ()))
                 for agent in AGENTS:
                     running = self.doing[agent]
                     if running is not None and next(running, None) is not None:
                         return ({self.at} if self._accepted() else set()), True
-                self.running[self.at] = set(self._that_run(top, ()))
                 self.at += 1
                 if self.at == len(self.rows):
                     return found, False

@@ -222,9 +222,10 @@ def commands(folder: Path, scratch: Path) -> dict[str, list[str]]:
 
 
 def main() -> None:
-    """Run every command over every kind of damage, then over pairs, until the time is over."""
+    """Run every command over every kind of damage, then over pairs, until the time is over; or over some pairs."""
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("--minutes", type=float, default=60)
+    parser.add_argument("--pairs", type=int, default=0, help="so many random pairs alone; they may take all minutes")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--limit", type=float, default=30.0, help="CPU seconds of a run that hangs")
     options = parser.parse_args()
@@ -241,6 +242,8 @@ def main() -> None:
         kinds = damages()
         todo = [[kind] for kind in kinds]
         chance.shuffle(todo)
+        if options.pairs:
+            todo = [chance.sample(sorted(kinds), 2) for _ in range(options.pairs)]
         applied = 0
 
         def figures() -> str:
@@ -248,7 +251,7 @@ def main() -> None:
             return f"{told}, {len(todo)} not reached: {dict(outcomes)}"
 
         attack = Round(options.minutes, figures)
-        while attack.goes_on():
+        while attack.goes_on(more=bool(todo) or not options.pairs):
             chosen = todo.pop() if todo else chance.sample(sorted(kinds), 2)
             # in a process of its own: one with threads of libraries is not to be forked
             if _apart(partial(_damage, sound, folder, [kinds[kind] for kind in chosen]), work)[0] == "exit 0":

@@ -167,7 +167,8 @@ def test_what_runs_out_is_named_with_its_limit(limit, most, letter, way, command
         assert last.startswith("error[resources-exhausted]")
         assert last.endswith(f"(`ulimit -{letter}` is {most})")
         assert all(line.startswith("<jemalloc>") for line in noise)  # Arrow's, before anybody can prevent it
-    assert done.returncode in ((0, 2) if way == "ingest" else (2,))
+    # eight processes are enough where there are few cores
+    assert done.returncode in ((0, 2) if way == "ingest" or (limit, most) == ("RLIMIT_NPROC", 8) else (2,))
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="limits of address space are those of Linux")

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from scenicq.errors import DataError
-from scenicq.store.atomic_files import sole_writer
+from scenicq.store.targets import target_of
 
 PROGRAM = Path(__file__).parents[3] / "sample_data/scenarios/02_crossing_cars.scenic"
 needs_locks = pytest.mark.skipif(sys.platform == "win32", reason="there are no locks on folders")
@@ -14,12 +14,12 @@ needs_locks = pytest.mark.skipif(sys.platform == "win32", reason="there are no l
 
 @needs_locks
 def test_a_second_writer_is_told(tmp_path):
-    with sole_writer(tmp_path / "target"):
-        with pytest.raises(DataError, match="another run writes to"), sole_writer(tmp_path / "target"):
+    with target_of(tmp_path / "target").sole_writer():
+        with pytest.raises(DataError, match="another run writes to"), target_of(tmp_path / "target").sole_writer():
             pass
         assert (tmp_path / "target").is_dir()
     assert not (tmp_path / "target").exists()
-    with sole_writer(tmp_path / "target"):
+    with target_of(tmp_path / "target").sole_writer():
         (tmp_path / "target/file").touch()
     assert (tmp_path / "target/file").exists()
 
@@ -27,7 +27,7 @@ def test_a_second_writer_is_told(tmp_path):
 @needs_locks
 def test_two_runs_that_go_on_with_one_file(run, crossroads, tmp_path):
     words = ("match", PROGRAM, crossroads, "--jobs", "1", "--resume", "-o", tmp_path / "found.jsonl")
-    with sole_writer(tmp_path / ".found.jsonl.pieces"):
+    with target_of(tmp_path / ".found.jsonl.pieces").sole_writer():
         told = run(*words)
     assert told.exit_code == 2
     assert told.stderr.startswith("error[target-busy]")
@@ -37,7 +37,7 @@ def test_two_runs_that_go_on_with_one_file(run, crossroads, tmp_path):
 
 @needs_locks
 def test_two_runs_with_one_report(run, crossroads, tmp_path):
-    with sole_writer(tmp_path / "report"):
+    with target_of(tmp_path / "report").sole_writer():
         told = run("match", PROGRAM, crossroads, "--jobs", "1", "--report", tmp_path / "report")
     assert (told.exit_code, told.stdout) == (2, "")
     assert told.stderr.startswith("error[target-busy]")

@@ -38,7 +38,7 @@ def test_in_a_pipe_results_are_json_lines_and_stderr_is_empty(installed, crossro
     assert [record["frame"] for record in records] == FRAMES
     summary = records[-1].pop("summary")
     texts = summary.pop("variables").values()
-    assert summary == {"complete": True, "results": 5, "frames": 156}
+    assert summary == {"version": 1, "complete": True, "results": 5, "frames": 156}
     assert all(each in crossing.read_text() for each in texts)
     assert all(list(record) == KEYS for record in records)
     assert records[0]["correspondence"] == {"ego": "ego", "leftward": "car-left-1", "rightward": "car-right-1"}

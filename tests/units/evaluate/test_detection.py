@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from scenicq.errors import DataError
-from scenicq.evaluate import detection
 from scenicq.evaluate.detection import Detection, detect
 from scenicq.evaluate.evaluation import evaluate
 from scenicq.evaluate.precision import _interpolated
@@ -78,14 +77,11 @@ def by_loop(found: Detection, threshold: float, *, nearest_only: bool) -> list[i
 @pytest.mark.parametrize("protocol", [PLAIN, NEAREST])
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.one_in(12)
-def test_the_same_as_a_loop_in_pieces_of_any_size(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, at_once: int, protocol: Protocol, seed: int
-) -> None:
-    monkeypatch.setattr(detection, "_AT_ONCE", at_once)
+def test_the_same_as_a_loop_in_pieces_of_any_size(tmp_path: Path, at_once: int, protocol: Protocol, seed: int) -> None:
     rng = np.random.default_rng(seed)
     dataset = fleet(tmp_path / "d", rng, 6, 5)
     names = [label.frame for label in dataset.labels()]
-    found = detect(dataset, boxes(names, rng, 60, protocol))
+    found = detect(dataset, boxes(names, rng, 60, protocol), at_once=at_once)
     assert (np.diff(found.predictions.score) <= 0).all()
     for threshold in THRESHOLDS_M:
         owners = found.owner[threshold].tolist()

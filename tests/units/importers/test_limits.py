@@ -12,10 +12,9 @@ import pyarrow.feather
 import pytest
 
 from scenicq.errors import DataError
-from scenicq.importers import grouped_lines
 from scenicq.importers.columnar import read_feather
 from scenicq.importers.fields import InvalidError, text
-from scenicq.importers.grouped_lines import group_lines
+from scenicq.importers.grouped_lines import LineBounds, group_lines
 from scenicq.importers.ingest import ingest
 from scenicq.importers.opendrive import convert_xodr
 from scenicq.importers.report import Report
@@ -37,25 +36,23 @@ def _change(source: Path, change) -> None:
     file.write_text("".join(json.dumps(line) + "\n" for line in lines))
 
 
-def test_a_line_that_is_too_long_is_left_out_and_the_others_are_read(source, monkeypatch):
-    monkeypatch.setattr(grouped_lines, "_LONGEST_LINE", 1 << 14)
+def test_a_line_that_is_too_long_is_left_out_and_the_others_are_read(source):
     file = source / "labels.jsonl"
     whole = file.read_bytes().splitlines(keepends=True)
     assert max(map(len, whole)) < 1 << 14
     file.write_bytes(b"".join([whole[0], b"x" * 100_000 + b"\n", *whole[1:]]))
     report = Report()
-    lines, _, count = group_lines([file], None, report)
+    lines, _, count = group_lines([file], None, report, LineBounds(longest=1 << 14))
     assert count == len(whole)
     read = sorted(line + b"\n" for name in lines.runs for line, _ in lines.read(name))
     assert read == sorted(whole)
     assert "labels.jsonl:2: a line of 100,001 bytes is no label" in report.diagnostics[0].message
 
 
-def test_nothing_but_empty_lines_is_no_source(source, monkeypatch):
-    monkeypatch.setattr(grouped_lines, "_MOST_EMPTY", 1000)
+def test_nothing_but_empty_lines_is_no_source(source):
     (source / "labels.jsonl").write_bytes(b"\n" * 1002)
     with pytest.raises(DataError, match="more than 1,000 empty lines"):
-        group_lines([source / "labels.jsonl"], None, Report())
+        group_lines([source / "labels.jsonl"], None, Report(), LineBounds(empty=1000))
 
 
 def test_a_packed_file_that_grows_beyond_all_measure_is_refused(tmp_path, monkeypatch):

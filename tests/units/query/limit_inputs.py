@@ -45,7 +45,6 @@ from scenicq.match.tolerance import EXACT, parse_tolerance
 from scenicq.match.verdict import Match, Unknown
 from scenicq.query.execution.lazy_solver import LazySolver
 from scenicq.query.execution.run import Query, QueryOptions
-from scenicq.query.explain import prefilter_counts
 from scenicq.query.explain.advice import advice
 from scenicq.query.explain.frame_explanation import explain, show_explanation
 from scenicq.query.explain.interval_explanation import explain_recording
@@ -279,7 +278,6 @@ def advised(stores: Stores, text: str, *, brief: bool = False, sampled: bool = F
     with pytest.MonkeyPatch.context() as patch:
         if sampled:
             patch.setattr(LIMITS, "advice_frames", 10)
-            patch.setattr(prefilter_counts, "_SPOT_FRAMES", 10)
         return told(advice(query, brief=brief))
 
 

@@ -11,8 +11,10 @@ import importlib
 import importlib.util
 import math
 import pkgutil
+import random
 import re
 import sys
+import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -25,6 +27,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 from limit_inputs import INPUTS, Facts, Stores, stores_of
 
+from scenicq import budget
 from scenicq.errors import ScenicqError
 from scenicq.limits import LIMITS, limits
 from scenicq.query.execution.lazy_solver import LazySolver
@@ -321,6 +324,42 @@ def test_no_limit_changes_an_answer(compared, limit, number):
     # every limit meets an eighth of the inputs, every input an eighth of the limits
     for name in sorted(INPUTS)[number % 8 :: 8]:
         compared.compare(name, at_least(limit))
+
+
+# --- the time of a label
+
+
+class Clocks:
+    """Those of a thread and of the wall, which jump when one has looked at that of the wall so many times."""
+
+    def __init__(self, looks: float) -> None:
+        self.looks, self.seen = looks, 0
+
+    def perf_counter(self) -> float:
+        self.seen += 1
+        return time.perf_counter() + self._late()
+
+    def thread_time(self) -> float:
+        return time.thread_time() + self._late()
+
+    def monotonic(self) -> float:
+        return time.monotonic()
+
+    def _late(self) -> float:
+        return 1e9 if self.seen >= self.looks else 0.0
+
+
+@pytest.mark.timeout(1800)
+@pytest.mark.parametrize(
+    "name", [pytest.param(each, marks=[] if each in FAST else [pytest.mark.slow]) for each in sorted(INPUTS)]
+)
+@pytest.mark.one_in(12)
+def test_the_time_may_be_used_up_at_any_moment(compared, name, rounds):
+    counting = Clocks(math.inf)
+    compared.compare(name, lambda patch: patch.setattr(budget, "time", counting))
+    moments = random.Random(name).sample(range(1, counting.seen + 1), min(rounds(48), counting.seen))
+    for moment in sorted({*moments, counting.seen}):
+        compared.compare(name, lambda patch, moment=moment: patch.setattr(budget, "time", Clocks(moment)))
 
 
 # --- sizes of batches

@@ -71,14 +71,14 @@ def test_files_are_linked_where_they_are_and_nowhere_else(root, report, tmp_path
     assert list(report.iterdir()) == []
 
 
-def test_thumbnails_are_small_and_made_once(root, report, monkeypatch):
+def test_thumbnails_are_small_and_made_once(root, report):
     _camera(root / "a.jpg")
     files = SensorFiles((root,), report, report, thumbnails=True)
     (first,) = files.find({"CAM": "a.jpg"})
     small = images.open(report / first.thumbnail)
     assert small.size == (320, 180)
     assert small.format == "JPEG"
-    monkeypatch.setattr(sensors, "_small", None)
+    (root / "a.jpg").write_bytes(b"no picture any more")
     assert files.find({"CAM": "a.jpg"}) == [first]
 
 
@@ -164,11 +164,11 @@ def test_the_cameras_in_front_come_first_where_there_are_too_many(root, report):
 
 
 def test_cameras_lie_beside_a_report_that_is_too_large(driven, tmp_path, monkeypatch):
-    monkeypatch.setattr(sensors, "_INSIDE_BYTES", 0)
+    monkeypatch.setattr(sensors, "INSIDE_BYTES", 0)
     write_report(*driven, tmp_path / "few", sensors=tmp_path / "source")
     assert len(list((tmp_path / "few" / "thumbnails").iterdir())) == 3
     monkeypatch.setattr(write, "INLINE", 1)
-    monkeypatch.setattr(sensors, "_INSIDE_BYTES", 10**9)
+    monkeypatch.setattr(sensors, "INSIDE_BYTES", 10**9)
     text = write_report(*driven, tmp_path / "many", sensors=tmp_path / "source").read_text(encoding="utf-8")
     small = {path.name for path in (tmp_path / "many" / "thumbnails").iterdir()}
     assert {part[:24] for part in text.split('<img src="thumbnails/')[1:]} == small

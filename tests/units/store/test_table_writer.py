@@ -27,12 +27,11 @@ def pieces_of(rows, sizes):
 
 
 @pytest.mark.parametrize("table", SEGMENT_TABLES)
-def test_however_small_pieces_make_the_same_file_in_bounded_memory(table, crossroads, tmp_path, monkeypatch):
-    monkeypatch.setattr("scenicq.store.parquet._ROW_GROUP", 700)
+def test_however_small_pieces_make_the_same_file_in_bounded_memory(table, crossroads, tmp_path):
     rows, chance = first_rows(crossroads, table), random.Random(table)
     parts = []
     for sizes in (lambda: ROWS, lambda: 1, lambda: chance.randint(1, 900)):
-        writer = TableWriter(tmp_path, table)
+        writer = TableWriter(tmp_path, table, row_group=700)
         for piece in pieces_of(rows, sizes):
             writer.add(piece)
         parts.append(writer.finish())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from scenes import compiled, drawn, label_of
 from scenicq.forest.column_domain import ColumnDomain
 from scenicq.match.fields import field_solver, witness_search
 from scenicq.match.fields.trials import TrialSpace
-from scenicq.match.fields.witness_search import QUICK, find_witness
+from scenicq.match.fields.witness_search import QUICK, Effort, find_witness
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import parse_tolerance
@@ -39,7 +40,7 @@ class Begun(Exception):
     """A search begins: what comes after it does not matter here."""
 
 
-def spaces(text, monkeypatch, labels):
+def spaces(text, monkeypatch, labels, before=ON_BEND):
     """What draws are made of, for some labels of a program."""
     found = []
 
@@ -50,7 +51,7 @@ def spaces(text, monkeypatch, labels):
     with monkeypatch.context() as patched:
         patched.setattr(field_solver, "find_witness", begun)
         patched.setattr(witness_search, "find_witness", begun)
-        scenario = compiled(ON_BEND + text, BEND)
+        scenario = compiled(before + text, BEND)
         matcher = Matcher(scenario, MatchOptions(tolerance=TIGHT))
         for seed in range(labels):
             with pytest.raises(Begun):
@@ -66,13 +67,67 @@ def test_points_drawn_backwards_lead_to_what_is_observed(name, monkeypatch):
         assert space.ways_back
         for way in space.ways_back:
             search = witness_search._Search(space, QUICK, (), witness_search.trials_left(), 0)
-            draws = search._anywhere(count)
-            way.draw(space, draws, np.arange(count), np.random.default_rng(1))
-            x, y = space.values(space._steps, draws)[id(way.end)].data
-            # a point to which no way of the distance drawn leads back stays where it was
+            draws = search._evenly(count)
+            ways = way.followed(space, draws, np.random.default_rng(1), 4 * count)
+            begun = draws.take(ways.draw)
+            begun.places[space.hidden[way.leaf.identity].rows] = ways.place.T
+            begun.shares[:] = ways.shares
+            x, y = space.values(space._steps, begun)[id(way.end)].data
+            # a point beside the region is moved into it
             there = np.hypot(x - way.seen[0], y - way.seen[1]) < 1e-6
-            most = max(most, np.count_nonzero(there))
+            most = max(most, len(np.unique(ways.draw[there])))
     assert most >= count / 2
+
+
+def test_pairs_of_ways_begin_close_to_each_other_and_are_taken_in_turn(monkeypatch):
+    apart = []
+    for space in spaces(TWO, monkeypatch, 2, before=""):
+        search = witness_search._Search(space, QUICK, (), witness_search.trials_left(), 0)
+        (pair,) = [part for part in search.back._parts if hasattr(part, "other")]
+        draws, found = search._evenly(40), []
+        for some in (np.arange(0, 40, 2), np.arange(1, 40, 2)):
+            pair.put_into(draws, some)
+            known = space.values(space._steps, draws.take(some))
+            ends = [(known[id(way.end)].data, way.seen) for way in (pair.one, pair.other)]
+            found.append([np.hypot(place[0] - seen[0], place[1] - seen[1]) for place, seen in ends])
+        (first, off), (_, later) = found
+        apart.append((np.median(off), np.median(later), np.count_nonzero(first < 1e-6)))
+    off, later, led = min(apart)
+    assert led >= 10, "the first way leads where it should"
+    assert off < 1.0, "the other one nearly"
+    assert off <= later, "the closest are taken first"
+
+
+def test_a_search_ends_where_no_way_leads_back(monkeypatch):
+    (space,) = spaces(FOLLOWERS, monkeypatch, 1)
+    rounds = []
+
+    def tried(search, draws):
+        rounds.append(draws)
+        return space.run(draws)
+
+    monkeypatch.setattr(witness_search._Search, "_try", tried)
+    monkeypatch.setattr(witness_search._Search, "_witness", lambda *_: None)
+    monkeypatch.setattr(witness_search, "_PROGRESS", 2.0)
+    effort = Effort(draws=12, best=2, rounds=3, descents=1, idle=9)
+    for nowhere in (False, True):
+        rounds.clear()
+        search = witness_search._Search(space, effort, (), witness_search.trials_left(), 0)
+        monkeypatch.setattr(type(search.back), "lead_nowhere", nowhere)
+        assert search.run() is None
+        assert len(rounds) == (1 if nowhere else 3) * (2 + effort.descents)
+
+
+def test_a_place_off_everything_is_led_to_from_nowhere(monkeypatch):
+    (space,) = spaces(FOLLOWERS, monkeypatch, 1)
+    search = witness_search._Search(space, QUICK, (), witness_search.trials_left(), 0)
+    search._anywhere(60)
+    assert not search.back.lead_nowhere
+    space.ways_back[:] = [replace(way, seen=(way.seen[0] + 5e3, way.seen[1])) for way in space.ways_back]
+    search = witness_search._Search(space, QUICK, (), witness_search.trials_left(), 0)
+    assert not search.back.lead_nowhere, "nothing was drawn yet"
+    search._anywhere(60)
+    assert search.back.lead_nowhere == all(way.is_whole for way in space.ways_back)
 
 
 @pytest.mark.slow

@@ -7,7 +7,6 @@ import numpy as np
 from scenicq.errors import Source
 from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import parse_tolerance
-from scenicq.query.execution import frames_ahead
 from scenicq.query.execution.frames_ahead import FramesAhead, telling
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.dataset import open_dataset
@@ -28,11 +27,10 @@ def test_frames_count_once_whoever_tells_of_them():
     assert sum(shown) == 90
 
 
-def test_a_process_tells_how_far_it_is(monkeypatch):
-    monkeypatch.setattr(frames_ahead, "_EVERY_S", -1.0)
+def test_a_process_tells_how_far_it_is():
     told = []
     missed = np.array([3, -1, 0, -1, -1, 2], dtype=np.int16)
-    assert list(telling("abc", missed, (100, 106), told.append)) == ["a", "b", "c"]
+    assert list(telling("abc", missed, (100, 106), told.append, every_s=-1.0)) == ["a", "b", "c"]
     assert told == [(100, 106, 2), (100, 106, 4), (100, 106, 5)]
 
 

@@ -23,13 +23,13 @@ from maps_in_turns import maps_in_turns
 
 import scenicq
 from scenicq import budget
-from scenicq.errors import Source
+from scenicq.errors import DataError, Source
 from scenicq.importers.ingest import ingest
 from scenicq.query.execution.executors import ordered_results, resumable, run_here, usual_pieces
 from scenicq.query.execution.option_texts import DRIVING, read_options
 from scenicq.query.execution.records import record
-from scenicq.query.execution.result_files import read_results
-from scenicq.query.execution.result_summary import Completeness, ResultCount, ResultSummary
+from scenicq.query.execution.result_files import read_records, read_results
+from scenicq.query.execution.result_summary import RESULT_VERSION, Completeness, ResultCount, ResultSummary
 from scenicq.query.execution.run import Query
 from scenicq.query.execution.skipped_frames import summarize
 from scenicq.store.dataset import Dataset, open_dataset
@@ -266,6 +266,84 @@ def test_a_report_an_export_and_python_say_it(run: Any, crossroads: Path, tmp_pa
     whole = scenicq.open(crossroads).match(PLAIN)
     assert whole.summary.complete
     assert "complete" not in repr(whole)
+
+
+# --- versions
+
+
+def test_results_state_their_version(cut_files: dict[tuple[str, str], Path]) -> None:
+    for case in CUTS:
+        for form in FORMS:
+            stated = read_results(cut_files[case, form]).completeness.summary
+            assert stated is not None
+            assert stated.version == RESULT_VERSION, (case, form)
+
+
+def of_version(file: Path, version: int | None, target: Path) -> Path:
+    """A copy of results that states another version, or none."""
+    if file.suffix == ".parquet":
+        table = pq.read_table(file)
+        metadata = pq.read_metadata(file).metadata
+        told = json.loads(metadata[b"scenicq.summary"])
+        said = {**told, "version": version} if version is not None else {k: told[k] for k in told if k != "version"}
+        dataset = {b"scenicq.dataset": metadata[b"scenicq.dataset"]}
+        pq.write_table(table.replace_schema_metadata(dataset | {b"scenicq.summary": json.dumps(said).encode()}), target)
+    else:
+        text = file.read_text()
+        (stated,) = re.findall(rf'"+version"+: ?{RESULT_VERSION}, ?', text)
+        said = "" if version is None else stated.replace(str(RESULT_VERSION), str(version))
+        target.write_text(text.replace(stated, said))
+    return target
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_results_of_a_newer_version_are_refused_before_anything_of_them_is_read(
+    run: Any, cut_files: dict[tuple[str, str], Path], tmp_path: Path, form: str
+) -> None:
+    newer = of_version(cut_files["whole", form], RESULT_VERSION + 1, tmp_path / f"newer.{form}")
+    told = f"holds results of version {RESULT_VERSION + 1}; this program reads versions up to {RESULT_VERSION}"
+    if form != "parquet":
+        # nothing but the version says that this program cannot know what the results mean
+        newer.write_text(newer.read_text().replace("match", "mostly", 1))
+    with pytest.raises(DataError, match=told):
+        next(iter(read_records(newer)))
+    for pair in ([newer, cut_files["whole", form]], [cut_files["whole", form], newer]):
+        done = run("report", *pair)
+        assert done.exit_code == 2
+        assert done.stderr.count("error[") == done.stderr.count("error[results-version]") == 1
+        assert told in done.stderr
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_results_that_state_no_version_are_read_as_those_of_before(
+    cut_files: dict[tuple[str, str], Path], tmp_path: Path, form: str
+) -> None:
+    older = read_results(of_version(cut_files["whole", form], None, tmp_path / f"older.{form}"))
+    assert older == read_results(cut_files["whole", form])
+
+
+@pytest.mark.parametrize("form", ["jsonl", "csv"])
+def test_files_that_were_put_together_are_refused_for_any_of_them(
+    cut_files: dict[tuple[str, str], Path], tmp_path: Path, form: str
+) -> None:
+    whole = cut_files["whole", form].read_text()
+    newer = of_version(cut_files["whole", form], RESULT_VERSION + 1, tmp_path / f"newer.{form}").read_text()
+    (tmp_path / f"both.{form}").write_text(newer + whole[whole.index("\n") + 1 if form == "csv" else 0 :])
+    with pytest.raises(DataError, match="holds results of version"):
+        list(read_records(tmp_path / f"both.{form}"))
+
+
+def test_a_piece_of_a_newer_version_is_refused(run: Any, crossroads: Path, tmp_path: Path) -> None:
+    run("match", "-e", PAIR, crossroads, "--shard", "1/1", "-o", tmp_path / "p")
+    (piece,) = (tmp_path / "p").glob("*-of-*.jsonl")
+    *lines, last = piece.read_text().splitlines()
+    told = json.loads(last)
+    assert told["summary"]["version"] == RESULT_VERSION
+    told["summary"]["version"] = RESULT_VERSION + 1
+    piece.write_text("\n".join([*lines, json.dumps(told)]) + "\n")
+    done = run("gather", tmp_path / "p")
+    assert done.exit_code == 2
+    assert "error[results-version]" in done.stderr
 
 
 # --- pieces

@@ -20,7 +20,6 @@ from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import parse_tolerance
 from scenicq.query.execution.lazy_solver import LazySolver
 from scenicq.query.execution.run import Query, QueryOptions
-from scenicq.query.explain import prefilter_counts
 from scenicq.query.explain.advice import advice
 from scenicq.smt.solver import NoAnswer
 from scenicq.store.dataset import open_dataset
@@ -85,10 +84,10 @@ def test_a_parameter_is_a_change_too(dataset):
 
 
 def test_large_datasets_are_sampled(dataset, monkeypatch):
-    monkeypatch.setattr(LIMITS, "advice_frames", 10)
+    monkeypatch.setattr(LIMITS, "advice_frames", 100)
     query = taken(dataset, TEXT)
     assert not any(each.sampled for each in advice(query).outlooks)  # where the sample is all there is
-    monkeypatch.setattr(prefilter_counts, "_SPOT_FRAMES", 10)
+    monkeypatch.setattr(LIMITS, "advice_frames", 10)
     found = advice(query)
     assert found.outlooks
     assert all(each.sampled for each in found.outlooks)

@@ -71,6 +71,12 @@ SINGLE["around"] = (
 )
 
 
+ON_COURSE = (
+    "from scenicq.labels import along, beside\nego = new Car\nother = new Car\n"
+    "require -20 < along(ego, other) < 20 and abs(beside(ego, other)) < 6"
+)
+
+
 @pytest.fixture(scope="module")
 def dataset(tmp_path_factory) -> Dataset:
     """Scenes of programs, as they are and nudged."""
@@ -143,6 +149,12 @@ def test_sql_decides_what_it_can(dataset, name):
 def test_sql_decides_what_may_lie_anywhere(dataset, options):
     text = "ego = new Car\nother = new Car in everywhere, facing Range(0, 360) deg\nrequire (distance to other) < 20"
     sure, left = check(dataset, text, OPTIONS[options])
+    assert 2 * sure > left, (sure, left)
+
+
+@pytest.mark.parametrize("options", ["default", "exact", "box"])
+def test_sql_decides_who_is_on_the_course_of_the_ego(dataset, options):
+    sure, left = check(dataset, ON_COURSE, OPTIONS[options])
     assert 2 * sure > left, (sure, left)
 
 
