@@ -126,13 +126,17 @@ def test_on_no_map_a_program_is_without_scenes_and_without_a_word(name):
 @pytest.mark.parametrize(
     ("text", "message", "at"),
     [
-        ("ego = new Car on road", "no lane that `roadDirection` could be the direction of", "new Car on road"),
+        ("ego = new Car on road", "no lane whose direction `roadDirection` could be", "new Car on road"),
         ("ego = new Object in road.intersect(curb), facing 0", "nothing for `curb`", "in road.intersect(curb)"),
         ("ego = new Object in network.laneAt(0 @ 0), facing 0", "no such element", "in network.laneAt(0 @ 0)"),
-        (f"ego = new Object {HERE}\nrequire (roadDirection at ego) > 0", "no lane that", "(roadDirection at ego)"),
+        (
+            f"ego = new Object {HERE}\nrequire (roadDirection at ego) > 0",
+            "no lane whose direction",
+            "(roadDirection at ego)",
+        ),
         (
             f"ego = new Object {HERE}\nrequire network.laneAt(ego).group is None",
-            "no element here that `group` could be of",
+            "no element here, so there is no `group`",
             "group",
         ),
     ],

@@ -148,7 +148,7 @@ def test_a_heading_along_lanes_that_the_map_has_not_is_told(dataset, run, tmp_pa
     file.write_text(f"model scenic.domains.driving.model\nego = new Car {PLACED}\nnew Car at ego offset by 0 @ 5\n")
     done = run("match", file, dataset.folder)
     assert done.exit_code == 2
-    assert "error[map-lacks]: the map `town` has no lane that `roadDirection` could be the direction of" in done.stderr
+    assert "error[map-lacks]: the map `town` has no lane whose direction `roadDirection` could be" in done.stderr
     assert "the default heading of `Car` needs lanes" in done.stderr
     assert "`facing Range(0, 360) deg` needs nothing from the map" in done.stderr
     file.write_text(file.read_text().replace("0 @ 5", "0 @ 5, facing Range(0, 360) deg"))
