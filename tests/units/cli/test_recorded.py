@@ -67,7 +67,7 @@ def test_where_takes_what_is_known_to_hold(run, town, program):
 def test_what_is_not_known_is_left_out_counted_and_told(run, town, program):
     result = run("match", program, town, "--where", "speed > 3", "--summary")
     assert frames(result) == ["f4", "f6", "f7", "f8", "f9"]
-    assert "of 2 matches it is not known whether --where holds" in result.stderr
+    assert "2 matches left out: whether --where holds is not known" in result.stderr
     assert "5  left out by --where, 2 of which it is not known" in result.stderr
     assert "`speed` is recorded as null 2 times: not observed" in result.stderr
     assert result.exit_code == 3

@@ -104,7 +104,7 @@ def test_without_a_dataset_the_check_says_who_knows(run, dataset, tmp_path):
     program.write_text(f'{HEAD}{EGO}{CAR}require c.state == "parked"\n')
     alone, beside = run("check", str(program)), run("check", str(program), str(dataset.path))
     assert alone.exit_code == 2
-    assert "`state` can be read where labels of a dataset have it" in alone.output + alone.stderr
+    assert "`state` can be read if labels of the dataset have it" in alone.output + alone.stderr
     assert beside.exit_code == 0
 
 

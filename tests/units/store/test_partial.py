@@ -17,7 +17,7 @@ from scenicq.store.partial import Partial
 @pytest.mark.parametrize("moment", ["before the lock", "after the lock"])
 def test_an_interrupt_while_opening_leaves_nothing(tmp_path, monkeypatch, moment):
     partial = Partial(tmp_path / "dataset")
-    real = Partial._locked
+    real = Partial._take_lock
     calls = []
 
     def interrupted(self):
@@ -28,7 +28,7 @@ def test_an_interrupt_while_opening_leaves_nothing(tmp_path, monkeypatch, moment
             real(self)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(Partial, "_locked", interrupted)
+    monkeypatch.setattr(Partial, "_take_lock", interrupted)
     with pytest.raises(KeyboardInterrupt):
         partial.open()
     assert list(tmp_path.iterdir()) == []
@@ -38,7 +38,7 @@ def test_an_interrupt_while_opening_keeps_what_is_worth_going_on_from(tmp_path, 
     first = Partial(tmp_path / "dataset")
     first.folder.mkdir()
     (first.folder / "labels").mkdir()
-    real = Partial._locked
+    real = Partial._take_lock
     calls = []
 
     def interrupted(self):
@@ -47,7 +47,7 @@ def test_an_interrupt_while_opening_keeps_what_is_worth_going_on_from(tmp_path, 
             raise KeyboardInterrupt
         return real(self)
 
-    monkeypatch.setattr(Partial, "_locked", interrupted)
+    monkeypatch.setattr(Partial, "_take_lock", interrupted)
     with pytest.raises(KeyboardInterrupt):
         first.open()
     assert (first.folder / "labels").is_dir()
