@@ -400,10 +400,10 @@ def judge(text, roles, conditions, label, way, verdict, seen, draw):
 
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.one_in(3)
-def test_frames_are_those_of_plain_enumeration(tmp_path, seed):
-    seen = run_frames(tmp_path / "d", seed, 24)
-    assert min(seen["match"], seen["no"]) > 40
-    assert seen["unknown"] > 2
+def test_frames_are_those_of_plain_enumeration(tmp_path, rounds, seed):
+    seen = run_frames(tmp_path / "d", seed, max(8, rounds(24)))
+    assert min(seen["match"], seen["no"]) > 10
+    assert seen["unknown"]
 
 
 @pytest.mark.slow

@@ -150,8 +150,7 @@ def test_nor_does_one_in_a_process_of_somebody_else(program, crossroads):
 
 
 @pytest.mark.parametrize(("engine", "form"), itertools.product(ENGINES, FORMATS))
-@pytest.mark.one_in(len(FORMATS) + 1)
-@pytest.mark.one_in(8)
+@pytest.mark.one_in(16)
 def test_results_are_the_same_bytes_where_libraries_print(
     engine, form, command, program, crossroads, quiet, noisy, double
 ):

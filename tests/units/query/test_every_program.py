@@ -122,7 +122,7 @@ def compare(dataset: Dataset, chosen: list[Example]) -> tuple[list[str], int]:
 
 
 @pytest.mark.parametrize(
-    ("dataset", "step"), [("crossroads", 128), ("nuscenes_tiny", 96), ("waymo_tiny", 96)], indirect=["dataset"]
+    ("dataset", "step"), [("crossroads", 256), ("nuscenes_tiny", 96), ("waymo_tiny", 96)], indirect=["dataset"]
 )
 @pytest.mark.one_in(4)
 def test_some_programs_find_the_same(dataset: Dataset, step: int) -> None:
