@@ -221,7 +221,7 @@ def run(folder: Path, seed: int, programs: int, until: float = float("inf")) -> 
 
 
 def test_choices_over_time_are_those_of_the_definition(tmp_path: Path):
-    seen = run(tmp_path / "d", 1, 3)
+    seen = run(tmp_path / "d", 1, 2)
     assert min(seen["match"], seen["no"]) > 10
     assert seen["undecided"] < sum(seen.values()) / 100
 

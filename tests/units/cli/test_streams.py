@@ -149,7 +149,7 @@ def test_nor_does_one_in_a_process_of_somebody_else(program, crossroads):
     assert all("/" in frame for frame in frames)
 
 
-@pytest.mark.parametrize(("engine", "form"), itertools.product(ENGINES, FORMATS))
+@pytest.mark.parametrize(("engine", "form"), list(itertools.product(ENGINES, FORMATS)))
 @pytest.mark.one_in(16)
 def test_results_are_the_same_bytes_where_libraries_print(
     engine, form, command, program, crossroads, quiet, noisy, double
@@ -308,7 +308,7 @@ def usual(command, program, crossroads, tmp_path_factory):
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="the system has no /dev/full")
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize(("what", "stream", "kind"), ODD_STREAMS)
-@pytest.mark.one_in(104)
+@pytest.mark.slow
 def test_an_odd_stream_is_told_or_makes_no_difference(what, stream, kind, usual, tmp_path):
     start, words, run = usual
     code, data, told, files = run(what)

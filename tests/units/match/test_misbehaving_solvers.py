@@ -90,7 +90,7 @@ COMMANDS = {
 
 
 @pytest.mark.parametrize("reason", COMMANDS)
-@pytest.mark.one_in(6)
+@pytest.mark.slow
 def test_a_command_that_misbehaves_leaves_its_frames_unknown(reason, honest, verdicts, tmp_path):
     stub = tmp_path / "stub.py"
     stub.write_text(COMMANDS[reason])

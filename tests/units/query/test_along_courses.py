@@ -178,7 +178,7 @@ def _found(dataset: Dataset, text: str, **options) -> dict[str, bool | None]:
 
 
 @pytest.mark.parametrize("condition", CONDITIONS)
-@pytest.mark.one_in(18)
+@pytest.mark.slow
 def test_frames_are_those_of_the_definition(drawn: Drawn, condition: str) -> None:
     text = f"{HEAD}require {condition}\n"
     found = _found(drawn.dataset, text)

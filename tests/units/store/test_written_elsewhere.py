@@ -297,7 +297,8 @@ if __name__ == "__main__":
 
 @pytest.mark.skipif(os.name != "posix", reason="signals")
 @pytest.mark.timeout(1800)
-@pytest.mark.parametrize("kills", [1, pytest.param(10, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("kills", [1, 10])
+@pytest.mark.slow
 def test_a_resumed_run_that_is_killed(
     kills: int, run: Any, crossroads: Path, bucket: Any, place: str, tmp_path: Path
 ) -> None:

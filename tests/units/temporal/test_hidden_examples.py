@@ -87,6 +87,7 @@ def test_every_end_that_some_point_makes_is_found(crossroads):
         assert ends[each.frame, roles["other"]] >= possible, each.frame
 
 
+@pytest.mark.slow
 def test_what_is_cut_off_has_no_point_that_ends_it(found, crossroads):
     dataset = open_dataset(crossroads)
     cut = [each for each in found if isinstance(each.verdict, NoMatch)]
