@@ -7,7 +7,7 @@ observed features: those are the label's values, not variables.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from scenicq.errors import Span
 from scenicq.forest.components import connected_components
@@ -71,6 +71,11 @@ class Group:
     objects: tuple[int, ...]
     doubtful: tuple[Constraint, ...] = ()
     certain: tuple[Constraint, ...] = ()
+
+    @property
+    def certain_group(self) -> Group:
+        """The group that label objects satisfy only if they do for every value of what is not observed."""
+        return replace(self, constraints=self.certain, doubtful=(), certain=()) if self.doubtful else self
 
 
 def group_constraints(constraints: Iterable[Constraint]) -> tuple[Group, ...]:

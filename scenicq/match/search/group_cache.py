@@ -43,7 +43,7 @@ from scenicq.match.search.group_plan import GroupPlan
 if TYPE_CHECKING:  # takes long to load
     from scenicq.match.fields.heading_propagation import DirectedCases, KnownCases
 
-__all__ = ["POSTPONED", "GroupCache", "certain_group", "possible_outcome", "rename_variables"]
+__all__ = ["POSTPONED", "GroupCache", "possible_outcome", "rename_variables"]
 
 POSTPONED = "postponed"
 """The reason of what is undecided for want of patience alone."""
@@ -139,8 +139,7 @@ class GroupCache:
         outcome = self._in_closed_form(plan, assignment) or (yield from self._by_cascade(group, assignment))
         if not isinstance(outcome, Satisfied) or not (group.doubtful or self.has_doubts(group, assignment)):
             return outcome
-        sure = certain_group(group) if group.doubtful else group
-        return possible_outcome(group, (yield from self._by_cascade(sure, assignment, certain=True)))
+        return possible_outcome(group, (yield from self._by_cascade(group.certain_group, assignment, certain=True)))
 
     def _in_closed_form(self, plan: GroupPlan, assignment: Mapping[int, int]) -> Outcome | None:
         """What a closed form says, if it is clear."""
@@ -212,13 +211,8 @@ def rename_variables(decided: tuple[Group, Outcome], target: Group) -> Outcome:
     )
 
 
-def certain_group(group: Group) -> Group:
-    """The group that label objects satisfy only if they do for every value of what is not observed."""
-    return replace(group, constraints=group.certain, doubtful=(), certain=())
-
-
 def possible_outcome(group: Group, sure: Outcome) -> Outcome:
-    """The outcome of a group that may be satisfied, from that of `certain_group` of it."""
+    """The outcome of a group that may be satisfied, from that of its `certain_group`."""
     if not isinstance(sure, Refuted):
         return sure
     return Undecided(group.doubtful[0] if group.doubtful else sure.constraint, UNOBSERVED)

@@ -29,7 +29,7 @@ from scenicq.match.problem.outcome import Outcome, Patience, Refuted, Satisfied,
 from scenicq.match.problem.symmetry import sort_interchangeable
 from scenicq.match.search.arc_consistency import arc_consistent
 from scenicq.match.search.backtracking import Consistency, Reporter, find_assignments
-from scenicq.match.search.group_cache import POSTPONED, GroupCache, certain_group, possible_outcome, rename_variables
+from scenicq.match.search.group_cache import POSTPONED, GroupCache, possible_outcome, rename_variables
 from scenicq.match.search.group_plan import GroupPlan, MatchPlan
 
 __all__ = ["Failure", "LabelSearch", "Solution"]
@@ -459,8 +459,7 @@ class LabelSearch:
             groups = [each.group for each in plan.groups]
             doubtful = [group for group in groups if group.doubtful or self._decisions.has_doubts(group, assignment)]
             if doubtful and isinstance(outcome, Satisfied):
-                sure = [certain_group(group) if group.doubtful else group for group in groups]
-                items = [self._decisions.items(group, assignment, certain=True) for group in sure]
+                items = [self._decisions.items(group.certain_group, assignment, certain=True) for group in groups]
                 outcome = possible_outcome(doubtful[0], self.ask(items))
             return outcome
         except CannotEvaluate as error:

@@ -99,24 +99,24 @@ def sufficient_conditions(
     tolerance = options.tolerance.for_scenario(scenario)
     reader = ConditionReader(scenario, tolerance, relations, network.roadDirection, proving=True, radius=options.radius)
     relevant = relevant_properties(scenario, options)
+    on_course = course_column(scenario)
+    # read from columns, or never taken for granted as labels alone tell it
     told = [
-        frozenset(name for name in names if _has_column(scenario, index, name)) for index, names in enumerate(relevant)
+        frozenset(
+            name
+            for name in names
+            if name in _COLUMNED or (index, name) in on_course or is_only_observed(scenario, index, name)
+        )
+        for index, names in enumerate(relevant)
     ]
     found = list(_without_attributes(scenario, options, [a - b for a, b in zip(relevant, told, strict=True)]))
     signature = (*told, frozenset[str]())
     for group in build_groups(scenario, signature, options):
         # what is known up to two ends must hold whichever it is
-        surely = replace(group, constraints=group.certain) if group.doubtful else group
-        found += _proof(surely, reader, scenario, options.classes)
+        found += _proof(group.certain_group, reader, scenario, options.classes)
     if any(each.sql is False for each in found):
         return None
     return tuple(each for each in found if each.region or each.sql is not True)
-
-
-def _has_column(scenario: Scenario, index: int, name: str) -> bool:
-    """Whether a property is read from a column, or is never taken for granted as labels alone tell it."""
-    read = name in _COLUMNED or (index, name) in course_column(scenario)
-    return read or is_only_observed(scenario, index, name)
 
 
 def _without_attributes(
