@@ -12,7 +12,7 @@ from scenicq.compiler.coroutines import NotBegun, ScenarioCall
 from scenicq.compiler.elements import MISSING, is_of_elements, names_of, of_element, of_network
 from scenicq.compiler.following import follow
 from scenicq.compiler.label_attributes import label_attribute
-from scenicq.compiler.lookups import linked, look_up_of
+from scenicq.compiler.lookups import follow_link, look_up_of
 from scenicq.compiler.random_values import each_existing, regions_apart
 from scenicq.compiler.region_attributes import REGION_METHODS, holds_regions, of_region
 from scenicq.compiler.suggestions import unknown_attribute
@@ -81,7 +81,7 @@ def attribute(run: Interpreter, value: ModelValue, name: str, span: Span) -> Mod
         if name in REGION_METHODS and holds_regions(value):
             return REGION_METHODS[name](to_region(value, span))
         if any(isinstance(option, AbstractElement) for option in value.options):
-            return linked(run, value, name, span)
+            return follow_link(run, value, name, span)
         return _of_choice(run, value, name, span)
     found = _lookup(run, value, name, span)
     if found is MISSING and isinstance(options := regions_apart(value), Choice):

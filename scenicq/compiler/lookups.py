@@ -29,7 +29,7 @@ from scenicq.geometry.occupancy import ElementAtPoint
 if TYPE_CHECKING:
     from scenicq.compiler.interpreter import Interpreter
 
-__all__ = ["among", "going_of", "linked", "look_up", "look_up_of", "look_up_ways"]
+__all__ = ["among", "follow_link", "going_of", "look_up", "look_up_of", "look_up_ways"]
 
 _WITH_NOTHING = 2
 """Outcomes of a look-up over an abstract map: any element, and none."""
@@ -91,7 +91,7 @@ def look_up(
     return _at(run, (id(network), name), table, point, reject, span, known, going=going)
 
 
-def linked(run: Interpreter, choice: Choice, name: str, span: Span) -> ModelValue:
+def follow_link(run: Interpreter, choice: Choice, name: str, span: Span) -> ModelValue:
     """What an attribute of the element at a place leads to, over an abstract map: a look-up at the same place.
 
     Args:

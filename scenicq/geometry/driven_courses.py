@@ -338,7 +338,7 @@ class _Segments:
     def _around(self, line: CourseLine, xy: Numbers) -> NDArray[np.intp]:
         """The pairs that the search tree finds, as numbers in order."""
         points = shapes.points(xy)
-        reach = line.tree.query_nearest(points, all_matches=False, return_distance=True)[1] + PASS_M
+        reach = shapes.tree_distances(line.tree, points) + PASS_M
         row, segment = shapes.tree_pairs_within(line.tree, points, reach + _EQUAL_M)
         return np.sort(row * self._count + segment)
 

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from scenicq.geometry.elements import LaneSection, NetworkElement
 from scenicq.geometry.features import MapFeature
-from scenicq.geometry.network_builder import related
+from scenicq.geometry.network_builder import relate_elements
 
 __all__ = ["DIRECTS", "IS_SECTION", "LINKS", "Link", "link_named", "links_of"]
 
@@ -80,7 +80,7 @@ def links_of(features: Sequence[MapFeature]) -> Iterator[Link]:
     Args:
         features: Its elements, with unique ids.
     """
-    elements = related(features)
+    elements = relate_elements(features)
     tables: Mapping[str, Mapping[str, Any]] = {
         "lane": elements.lanes,
         "lane_section": elements.sections,

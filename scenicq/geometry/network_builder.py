@@ -43,7 +43,7 @@ from scenicq.geometry.maneuvers import by_heading, maneuvers_of
 from scenicq.geometry.own_directions import along_unread_centerline, direction_of_intersection, direction_of_lanes
 from scenicq.geometry.regions import DeferredPolylines, PolylineSet
 
-__all__ = ["Elements", "link", "related"]
+__all__ = ["Elements", "link", "relate_elements"]
 
 _Element = TypeVar("_Element", bound=NetworkElement)
 _Long = TypeVar("_Long", bound=LongElement)
@@ -73,7 +73,7 @@ class Elements:
         return {name: element for table in tables for name, element in table.items()}
 
 
-def related(features: Sequence[MapFeature]) -> Elements:
+def relate_elements(features: Sequence[MapFeature]) -> Elements:
     """The elements of a network, with what they are parts of and lie beside, but neither lines nor ways on.
 
     Args:
@@ -99,7 +99,7 @@ def link(features: Sequence[MapFeature]) -> Elements:
     Args:
         features: With unique ids.
     """
-    elements, by_kind = related(features), _by_kind(features)
+    elements, by_kind = relate_elements(features), _by_kind(features)
     lanes = by_kind.get("lane", [])
     _make_curbs(by_kind.get("curb", []), elements)
     _link_road_sections(by_kind.get("road_section", []), elements)

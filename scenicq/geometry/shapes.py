@@ -133,6 +133,12 @@ def tree_nearest(
     return cast("NDArray[np.intp]", pairs[0]), cast("NDArray[np.intp]", pairs[1]), distances
 
 
+def tree_distances(tree: STRtree, geometries: NDArray[Any]) -> NDArray[np.float64]:
+    """How far each geometry is from what is nearest in the tree."""
+    distances: NDArray[np.float64] = tree.query_nearest(geometries, all_matches=False, return_distance=True)[1]
+    return distances
+
+
 def distance(a: Shape, b: Shape) -> float:
     """Distance of two geometries; inf if one is empty."""
     result = float(shapely.distance(a, b))

@@ -14,6 +14,7 @@ from scenicq.match.verdict import Match, NoMatch, Unknown, Verdict
 from scenicq.query.execution.recorded_columns import show_cell
 from scenicq.query.execution.results import Recorded
 from scenicq.query.execution.variable_texts import variable_texts
+from scenicq.query.explain.bands import shorten
 from scenicq.report.camera_pictures import SpaceBox, camera_image, space_box
 from scenicq.report.legend import SIGNS
 from scenicq.report.page import page
@@ -70,8 +71,7 @@ def _witness(verdict: Match, source: Source, texts: Mapping[str, str]) -> Iterat
             continue
         line, column = int(found[1]), int(found[2])
         text = texts.get(place.removesuffix(found[3] or ""), "")
-        shown = text if len(text) <= 48 else f"{text[:47]}\N{HORIZONTAL ELLIPSIS}"
-        yield f"{line}:{column}{found[3] or ''}", line, shown, _value(value)
+        yield f"{line}:{column}{found[3] or ''}", line, shorten(text), _value(value)
 
 
 def _causes(shot: Shot) -> list[str]:

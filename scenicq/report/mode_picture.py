@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.show_modes import ProcessMode, ProcessModes, modes_of
+from scenicq.query.explain.bands import shorten
 from scenicq.report.svg import element, escape
 
 __all__ = ["draw_modes"]
@@ -49,7 +50,11 @@ def draw_modes(scenario: Scenario) -> str:
         scenario: The program.
     """
     every = modes_of(scenario)
-    letters = [_cut(text) for process in every for text in (process.head, *map(_title, process.modes), *_rows(process))]
+    letters = [
+        shorten(text, _LETTERS)
+        for process in every
+        for text in (process.head, *map(_title, process.modes), *_rows(process))
+    ]
     width = 2 * _PAD + _LETTER * max(map(len, letters))
     parts: list[str] = []
     height, right = float(_PAD), width
@@ -139,10 +144,6 @@ def _rows_of(mode: ProcessMode) -> list[tuple[str, int | None]]:
 
 
 def _text(text: str, x: float, y: float, kind: str | None = None) -> str:
-    short = _cut(text)
+    short = shorten(text, _LETTERS)
     whole = [element("title", escape(text))] if short != text else []
     return element("text", *whole, escape(short), x=f"{x:g}", y=f"{y:g}", class_=kind)
-
-
-def _cut(text: str) -> str:
-    return text if len(text) <= _LETTERS else f"{text[: _LETTERS - 1]}\N{HORIZONTAL ELLIPSIS}"

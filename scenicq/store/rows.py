@@ -92,7 +92,7 @@ def recording_rows(
                 **_properties(objects),
                 **_motion("", times[label_of], objects, objects.track),
                 **_relative(egos, objects, label_of),
-                **course_columns(_nowhere() if index is None else index.network, times, egos, objects, label_of),
+                **course_columns(Network("", ()) if index is None else index.network, times, egos, objects, label_of),
                 "road_directions": lists_at(placed.directions, placed.place[object_at]),
                 "lane": _names(index, placed.lane[object_at]),
                 "last_lane": _known(last_lane[object_at]),
@@ -169,10 +169,6 @@ def _memberships(
         "distance": near.distance,
         "turn": turns,
     }
-
-
-def _nowhere() -> Network:
-    return Network("", ())
 
 
 def _names(index: MapIndex | None, features: NDArray[np.int64]) -> ArrowArray:

@@ -164,9 +164,9 @@ def show_bands(bands: Sequence[Band]) -> list[str]:
     return [f"{shorten(band.what).ljust(width)}  {_drawn(band.values)}" for band in bands]
 
 
-def shorten(text: str) -> str:
-    """Cut a text to what a name in a line may have."""
-    return text if len(text) <= 48 else f"{text[:47]}\N{HORIZONTAL ELLIPSIS}"
+def shorten(text: str, letters: int = 48) -> str:
+    """Cut a text to so many letters, by default those that a name in a line may have."""
+    return text if len(text) <= letters else f"{text[: letters - 1]}\N{HORIZONTAL ELLIPSIS}"
 
 
 def _drawn(values: Sequence[int]) -> str:
