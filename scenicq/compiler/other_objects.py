@@ -41,7 +41,7 @@ from scenicq.forest.nodes import (
     Select,
 )
 from scenicq.forest.unobserved import certain_and_possible
-from scenicq.forest.walk import children, is_leaf, leaves, postorder, rebuild
+from scenicq.forest.walk import children, conjuncts, is_leaf, leaves, postorder, rebuild
 
 if TYPE_CHECKING:
     from scenicq.compiler.interpreter import Interpreter
@@ -237,11 +237,15 @@ def _filter(run: Interpreter, named: Mapping[str, ModelValue], span: Span) -> Ca
 
 def _by_ends(condition: Node, element: Instance) -> Node:
     """A condition on numbers that are known up to two ends: unknown where the ends do not decide it."""
-    if not any(map(has_ends, postorder((condition,)))):
-        return condition
-    certain, possible = certain_and_possible(condition, lambda _: False)
-    unknown = Feature(cast(int, element.index), OPEN, "boolean", True, span=condition.span)
-    return build.connect(LogicOp.OR, [certain, build.connect(LogicOp.AND, [possible, unknown])])
+
+    def known(part: Node) -> Node:
+        if not any(map(has_ends, postorder((part,)))):
+            return part
+        certain, possible = certain_and_possible(part, lambda _: False)
+        unknown = Feature(cast(int, element.index), OPEN, "boolean", True, span=part.span)
+        return build.connect(LogicOp.OR, [certain, build.connect(LogicOp.AND, [possible, unknown])])
+
+    return build.connect(LogicOp.AND, list(map(known, conjuncts(condition))))
 
 
 _all_of = partial(build.connect, LogicOp.AND)

@@ -118,7 +118,6 @@ class CourseLine:
     Attributes:
         pieces: What it is made of.
         joints: Segments with which pieces end, each with one with which another goes on.
-        known: What has been measured from it.
     """
 
     def __init__(self, pieces: Sequence[_Piece], joints: Sequence[tuple[int, int]]) -> None:
@@ -127,7 +126,7 @@ class CourseLine:
         firsts = np.cumsum([0, *(len(each.xy) - 1 for each in pieces)]).tolist()
         self.joints = [(firsts[one + 1] - 1, firsts[other]) for one, other in joints]
         self._corridors: dict[float, PolygonSet] = {}
-        self.known: dict[tuple[float, ...], tuple[float, float, float, float]] = {}
+        self._known: dict[tuple[float, ...], tuple[float, ...]] = {}
         self.start = np.concatenate([each.xy[:-1] for each in pieces])
         self.step = np.concatenate([np.diff(each.xy, axis=0) for each in pieces])
         self.length = np.hypot(*self.step.T)
@@ -153,6 +152,29 @@ class CourseLine:
     def region(self) -> PolylineSet:
         """The line as a region."""
         return PolylineSet(tuple(LineString(each.xy) for each in self.pieces), "the course")
+
+    def measure(self, asked: Sequence[tuple[float, ...]]) -> list[tuple[float, ...]]:
+        """How far places are along and beside the line; the same question is answered once.
+
+        Args:
+            asked: How far along the object is, when, which way it faces, and x and y of the place.
+
+        Returns:
+            The ends of both (`CoursePlace.ends`), and 1 where the place is beyond what was driven.
+        """
+        known = {each: self._known[each] for each in asked if each in self._known}
+        new = [each for each in dict.fromkeys(asked) if each not in known]
+        if new:
+            if len(self._known) + len(new) > _KNOWN:
+                self._known.clear()
+            numbers = np.array(new)
+            ends, extended = _of_line(self, numbers[:, :3], numbers[:, 3:])
+            rows: list[list[float]] = np.column_stack((ends, extended)).tolist()
+            found = {each: (*row,) for each, row in zip(new, rows, strict=True)}
+            known |= found
+            if len(new) <= _KNOWN:
+                self._known |= found
+        return [known[each] for each in asked]
 
     def within(self, half_width: float) -> Region:
         """What lies within so many metres of the line."""
@@ -224,15 +246,8 @@ class CoursePlace:
         """The ends between which a place is along and beside the course; the same question is answered once."""
         if self.line is None:
             return -math.inf, math.inf, -math.inf, math.inf
-        known, asked = self.line.known, (self.s, self.time_s, self.sign, x, y)
-        found = known.get(asked)
-        if found is None:
-            if len(known) >= _KNOWN:
-                known.clear()
-            measures = measure([self], np.array([[x, y]]))
-            low, high, right, left = (float(each[0]) for each in (*measures.along, *measures.beside))
-            found = known[asked] = low, high, right, left
-        return found
+        (found,) = self.line.measure([(self.s, self.time_s, self.sign, x, y)])
+        return found[0], found[1], found[2], found[3]
 
 
 NO_COURSE = CoursePlace(None)
@@ -245,20 +260,23 @@ def measure(courses: Sequence[CoursePlace], xy: Numbers) -> Measures:
         courses: The course of each place.
         xy: The places, shape (n, 2).
     """
-    n = len(courses)
-    ends = np.tile(np.array([-np.inf, np.inf, -np.inf, np.inf]), (n, 1))
-    extended = np.zeros(n, np.bool_)
+    unknown = (-math.inf, math.inf, -math.inf, math.inf, 0.0)
+    found: list[tuple[float, ...]] = [unknown] * len(courses)
     by_line: dict[int, list[int]] = {}
     for number, each in enumerate(courses):
         if each.line is not None:
             by_line.setdefault(id(each.line), []).append(number)
+    places = xy.tolist()
     for numbers in by_line.values():
         line = cast(CourseLine, courses[numbers[0]].line)
         for first in range(0, len(numbers), _AT_ONCE):
             some = numbers[first : first + _AT_ONCE]
-            own = np.array([(courses[each].s, courses[each].time_s, courses[each].sign) for each in some])
-            ends[some], extended[some] = _of_line(line, own, xy[some])
-    return Measures((ends[:, 0], ends[:, 1]), (ends[:, 2], ends[:, 3]), extended)
+            mine = [(courses[each], places[each]) for each in some]
+            asked = [(each.s, each.time_s, each.sign, *place) for each, place in mine]
+            for number, measured in zip(some, line.measure(asked), strict=True):
+                found[number] = measured
+    low, high, right, left, extended = np.array(found).reshape(-1, 5).T
+    return Measures((low, high), (right, left), extended > 0)
 
 
 def _of_line(line: CourseLine, own: Numbers, xy: Numbers) -> tuple[Numbers, NDArray[np.bool_]]:

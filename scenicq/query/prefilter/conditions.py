@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import chain
 
 from scenicq.errors import Span
 from scenicq.forest.groups import PARAMS, Comparison, Condition, Group
@@ -33,7 +34,7 @@ from scenicq.query.prefilter.map_relations import (
     look_up_of,
     shared_look_ups,
 )
-from scenicq.query.prefilter.other_objects import proof
+from scenicq.query.prefilter.other_objects import conditions_of, proof, role_conditions
 from scenicq.store.classes import Granularity
 from scenicq.store.sql import sql_text
 
@@ -66,7 +67,9 @@ def necessary_conditions(
     for requirement in scenario.requirements:
         if requirement.built_in is None and requirement.span is not None:
             what = " ".join(requirement.span.text.split())
-            yield from _named(reader.requirement(requirement.condition), what, requirement.span)
+            found = reader.requirement(requirement.condition)
+            others = role_conditions(requirement.condition, scenario, options.classes)
+            yield from _named(chain(found, others), what, requirement.span)
 
 
 def _named(found: Iterator[ColumnCondition], what: str, span: Span | None) -> Iterator[ColumnCondition]:
@@ -146,12 +149,12 @@ def _proof(
     meant = _meant_elements(group, scenario.ego)
     for constraint in group.constraints:
         if isinstance(constraint, Condition):
-            for part in conjuncts(constraint.expression):
-                sql = proof(part, scenario, classes)
-                if sql is None:
+            for part in conditions_of(constraint.expression):
+                proved = proof(part, scenario, classes)
+                if proved is None:
                     yield from reader.requirement(part, meant)
                 else:
-                    yield ColumnCondition((), sql)
+                    yield proved
         elif constraint is not along:
             yield from reader.comparison(constraint, meant, None if along is None else along.expression)
 

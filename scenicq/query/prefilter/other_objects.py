@@ -1,19 +1,21 @@
 """What conditions on label objects without a role say in SQL: how many there may be, or surely are, in a frame.
 
-Read off are conditions on what the label objects and the ego are alone. Whoever plays a role is one of those
-counted: where others must be few, so many more as there are roles may be there.
+Read off are conditions on what the label objects, the ego and whoever plays one role are. Whoever plays a role is one
+of those counted: where others must be few, so many more as there are roles may be there.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from scenicq.errors import Span
+from scenicq.forest.build import connect
 from scenicq.forest.ego_frame import in_ego_frame
 from scenicq.forest.nodes import (
     ELEMENT,
     GIVEN,
+    IDENTITY,
     Among,
     AmongOp,
     Compare,
@@ -27,18 +29,19 @@ from scenicq.forest.nodes import (
     Node,
     Norm,
     Scale,
+    Select,
     VectorSum,
 )
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.walk import conjuncts, features, transform
-from scenicq.query.prefilter.condition_reader import EGO, course_column, object_columns
+from scenicq.query.prefilter.condition_reader import EGO, ColumnCondition, course_column, object_columns
 from scenicq.query.prefilter.said_columns import in_said_truths, said_columns
 from scenicq.query.prefilter.sql_bounds import SqlBounds
 from scenicq.query.prefilter.sql_ends import SQL, SqlTruth
 from scenicq.store.classes import ROOT, Granularity, class_truth, subclasses
 from scenicq.store.sql import sql_text
 
-__all__ = ["OBJECTS", "OTHER", "OtherCondition", "other_conditions", "proof"]
+__all__ = ["OBJECTS", "OTHER", "OtherCondition", "conditions_of", "other_conditions", "proof", "role_conditions"]
 
 OBJECTS = "block_objects"
 """The view of the label objects of a block, with their `number` in the file."""
@@ -71,45 +74,107 @@ def other_conditions(scenario: Scenario, classes: Granularity) -> Iterator[Other
         classes: How classes are compared.
     """
     for requirement in scenario.requirements:
-        for part in conjuncts(requirement.condition):
+        for part in conditions_of(requirement.condition):
             found = _read(part, scenario, classes, proving=False)
-            if found is not None:
-                yield OtherCondition(*found, requirement.span)
+            if found is not None and found.role is None:
+                yield OtherCondition(found.counted, found.at_least, found.most, requirement.span)
 
 
-def proof(part: Node, scenario: Scenario, classes: Granularity) -> str | None:
-    """SQL over a frame `ego` that proves a condition on label objects; None where SQL cannot tell.
+def role_conditions(root: Node, scenario: Scenario, classes: Granularity) -> Iterator[ColumnCondition]:
+    """What a condition on label objects says of one role, that whoever plays it misses only in no match.
 
     Args:
-        part: The condition.
+        root: The condition.
+        scenario: The scenario; the ego is that of the label.
+        classes: How classes are compared.
+    """
+    for part in conditions_of(root):
+        found = _read(part, scenario, classes, proving=False)
+        if found is not None and found.role is not None:
+            yield found.of_role
+
+
+def proof(part: Node, scenario: Scenario, classes: Granularity) -> ColumnCondition | None:
+    """What proves a condition on label objects; None where SQL cannot tell.
+
+    Args:
+        part: The condition, one of `conditions_of`.
         scenario: The scenario; the ego is that of the label.
         classes: How classes are compared.
     """
     found = _read(part, scenario, classes, proving=True)
-    if found is None:
-        return None
-    counted, at_least, most = found
-    few = f"<= {most}" if at_least is None else f">= {at_least}"
-    return f"(SELECT count(*) FROM {OBJECTS} {OTHER} WHERE {OTHER}.frame = {EGO}.frame AND {counted}) {few}"
+    return None if found is None else found.of_role
 
 
-def _read(part: Node, scenario: Scenario, classes: Granularity, *, proving: bool) -> tuple[str, int | None, int] | None:
-    """What counts and how many must, or may; None where SQL cannot tell."""
+def conditions_of(root: Node) -> Iterator[Node]:
+    """The parts of a condition that all must hold; whoever plays a role in a frame is seen in it."""
+    for part in conjuncts(root):
+        match part:
+            case Select(
+                index=Compare(CompareOp.EQ, Feature(property=name) as one, Feature() as other),
+                options=(Constant(value=False), seen),
+            ) if name == IDENTITY and (one.object, one.property) == (other.object, other.property):
+                yield from conditions_of(seen)
+            case _:
+                yield part
+
+
+@dataclass(frozen=True, slots=True)
+class _Reading:
+    """What SQL says of the label objects of a frame.
+
+    Attributes:
+        role: The role that it is about besides; None for the frame alone.
+        counted: SQL that is true of each label object `o` that counts, and of whoever plays the role, `a`; where nobody
+            is counted, of the role alone.
+        at_least: How many there must be, None where they must be few.
+        most: How many there may be.
+        counts: Whether label objects are counted.
+    """
+
+    role: int | None
+    counted: str
+    at_least: int | None = None
+    most: int = 0
+    counts: bool = True
+
+    @property
+    def of_role(self) -> ColumnCondition:
+        """As a condition on the frame, or on its object in the role."""
+        objects = () if self.role is None else (self.role,)
+        if not self.counts:
+            return ColumnCondition(objects, self.counted)
+        limit = f"<= {self.most}" if self.at_least is None else f">= {self.at_least}"
+        among = f"FROM {OBJECTS} {OTHER} WHERE {OTHER}.frame = {EGO}.frame AND {self.counted}"
+        return ColumnCondition(objects, f"(SELECT count(*) {among}) {limit}")
+
+
+def _read(part: Node, scenario: Scenario, classes: Granularity, *, proving: bool) -> _Reading | None:
+    """What a condition says; None where SQL cannot tell."""
     ego = scenario.ego
     negated = isinstance(part, Logic) and part.op is LogicOp.NOT
     node = part.args[0] if isinstance(part, Logic) and negated else part
     if not isinstance(node, Among) or node.op not in (AmongOp.AT_LEAST, AmongOp.EVERY):
         return None
     every, given = node.op is AmongOp.EVERY, node.inputs[node.excluded :]
-    if {index for index, _ in features(*given)} - {ego} or (every and negated):
+    spoken = {index for index, _ in features(*given)} - {ego}
+    if len(spoken) > 1 or (every and negated):
         return None
+    role = next(iter(spoken), None)
     columns = {(ELEMENT, name): column for name, column in object_columns(OTHER).items()}
     columns |= {(ego, name): column for name, column in object_columns(EGO, "ego_").items()} | course_column(scenario)
+    said = {ELEMENT: f"{OTHER}.attributes"}
+    if role is not None:
+        columns |= {(role, name): column for name, column in object_columns("a").items()}
+        said[role] = "a.attributes"
 
     def put_in(each: Node) -> Node:
         if isinstance(each, Feature) and each.object == GIVEN:
             return given[int(each.property)]
         match each:
+            case Feature(object=index) if index == ELEMENT:
+                # a frame is one moment, at which what is given is seen, too
+                return replace(each, current=False)
             case Contains(region=DiscAt(center=center, radius=radius), point=point):
                 away = Norm(VectorSum(point, Scale(center, Constant(-1.0))))
                 return Compare(CompareOp.LE, away, radius)
@@ -117,9 +182,20 @@ def _read(part: Node, scenario: Scenario, classes: Granularity, *, proving: bool
                 return each
 
     body = in_said_truths(in_ego_frame(transform(node.body.condition, put_in), ego))
-    bounds = SqlBounds({**columns, **said_columns((body,), {ELEMENT: f"{OTHER}.attributes"}, columns)})
+    bounds = SqlBounds({**columns, **said_columns((body,), said, columns)})
+    parts = [] if every else list(conjuncts(body))
+    own = [each for each in parts if _is_same(each, role, CompareOp.EQ)]
+    if own and not negated and node.number == 1:
+        asked = _of_role(connect(LogicOp.AND, [each for each in parts if each not in own]), role)
+        holds = SQL.negation(bounds.can_fail(asked)) if proving else bounds.can_hold(asked)
+        of_class = _of_class(node.category, classes, 2 if proving else 1, "a")
+        return _Reading(role, _and(of_class, holds, unknown=not proving), counts=False)
+    apart = [each for each in parts if _is_same(each, role, CompareOp.NE)]
+    if apart:
+        body = connect(LogicOp.AND, [each for each in parts if each not in apart])
     # of those who are all that is known is that some may play a role
-    roles = node.excluded - 1
+    excluded = {each.object for each in node.inputs[: node.excluded] if isinstance(each, Feature)}
+    roles = node.excluded - 1 - (role in excluded)
     few = negated or every
     if few == proving:
         # those that may count
@@ -128,15 +204,38 @@ def _read(part: Node, scenario: Scenario, classes: Granularity, *, proving: bool
     else:
         surely = bounds.can_hold(body) if every else bounds.can_fail(body)
         counted = _and(_of_class(node.category, classes, 2), SQL.negation(surely), unknown=False)
+    if apart or role in excluded:
+        counted = f"({counted} AND {OTHER}.number <> a.number)"
     least = 1 if every else node.number
     if few:
-        return counted, None, least - 1 + (0 if proving else roles)
-    return counted, least + (roles if proving else 0), 0
+        return _Reading(role, counted, most=least - 1 + (0 if proving else roles))
+    return _Reading(role, counted, least + (roles if proving else 0))
 
 
-def _of_class(category: str, classes: Granularity, least: int) -> str:
+def _of_role(root: Node, role: int | None) -> Node:
+    """What a condition on a label object says of the one that plays a role."""
+
+    def of_role(node: Node) -> Node:
+        if role is not None and isinstance(node, Feature) and node.object == ELEMENT:
+            return replace(node, object=role)
+        return node
+
+    return transform(root, of_role)
+
+
+def _is_same(node: Node, role: int | None, op: CompareOp) -> bool:
+    """Whether a condition is that a label object plays a role, or does not."""
+    match node:
+        case Compare(found, Feature() as one, Feature() as other):
+            compared = {(each.object, each.property) for each in (one, other)}
+            return found is op and compared == {(ELEMENT, IDENTITY), (role, IDENTITY)}
+        case _:
+            return False
+
+
+def _of_class(category: str, classes: Granularity, least: int, alias: str = OTHER) -> str:
     names = [name for name in subclasses(ROOT) if class_truth(category, name, classes) >= least]
-    return f"{OTHER}.class IN ({', '.join(map(sql_text, sorted(names)))})" if names else "false"
+    return f"{alias}.class IN ({', '.join(map(sql_text, sorted(names)))})" if names else "false"
 
 
 def _and(of_class: str, condition: SqlTruth, *, unknown: bool) -> str:

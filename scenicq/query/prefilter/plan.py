@@ -204,7 +204,7 @@ def _frames(
     """What the columns of the frame decide."""
     used = [each.counted for each in others]
     used += [each.sql for role in roles for each in role.plain] + [each.sql for tied in pairs.values() for each in tied]
-    kept = "".join(f", {EGO}.{name}" for name in columns_of(EGO, used))
+    kept = "".join(f", {EGO}.{name}" for name in columns_of(EGO, used) if name != "frame")
     blamed = [
         (f"NOT coalesce({each.sql}, true)", draft.step(each.what, each.span))
         for each in (*params, *own)

@@ -381,6 +381,16 @@ SELECT frame FROM ego WHERE frame NOT IN (
     AND coalesce(a.ego_beside + a.ego_beside_more > -2, true)
     AND coalesce(a.ego_beside - a.ego_beside_less < 2, true))""",
     ),
+    "the nearest ahead": _driving(
+        "from scenicq.labels import nearest\n"
+        "lead = new Truck in everywhere, facing Range(-180, 180) deg\nrequire lead is nearest(Truck, ahead=True)",
+        """
+SELECT DISTINCT a.frame FROM objects a JOIN ego USING (frame)
+WHERE a.class = 'Truck' AND a.ego_distance <= 50 AND a.ego_along - a.ego_along_less > 0
+AND NOT EXISTS (
+    SELECT 1 FROM objects b WHERE b.frame = a.frame AND b.class = 'Truck' AND b.ego_distance < a.ego_distance
+    AND coalesce(b.ego_along + b.ego_along_more > 0, true))""",
+    ),
     "nobody near": _driving(
         "from scenicq.labels import others\nrequire not any((distance to c) < 15 for c in others(Car))",
         """

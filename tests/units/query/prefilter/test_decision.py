@@ -158,6 +158,35 @@ def test_sql_decides_who_is_on_the_course_of_the_ego(dataset, options):
     assert 2 * sure > left, (sure, left)
 
 
+TO_A_ROLE = {
+    "nearest": "other is nearest(Car)",
+    "nearest ahead": "other is nearest(Car, ahead=True)",
+    "nearest within": "other is nearest(Car, within=CircularRegion(ego, 30))",
+    "nobody near it": "not any((distance from c to other) < 4 for c in others(Car))",
+    "somebody near it": "any((distance from c to other) < 40 for c in others(Car))",
+    "all farther": "all([(distance to c) > (distance to other) for c in others(Car)])",
+    "hardly east": "len([c for c in others(Car) if c.position.x < other.position.x + 50]) >= 1",
+}
+
+
+@pytest.mark.parametrize("name", list(TO_A_ROLE))
+@pytest.mark.one_in(4)
+def test_sql_decides_what_others_are_to_a_role(dataset, name):
+    """Each frame that SQL decides has a proof, and none that it rules out matches."""
+    text = (
+        "from scenicq.labels import nearest, others\nego = new Car\n"
+        f"other = new Car in everywhere, facing Range(0, 360) deg\nrequire {TO_A_ROLE[name]}"
+    )
+    sure, left = check(dataset, text, OPTIONS["default"])
+    assert sure > left, (sure, left)
+    source = Source("test.scenic", HEADER + text)
+    ids = [
+        {each.frame for each in Query(dataset, source, QueryOptions(prefilter=there, proofs=False)).results()}
+        for there in (True, False)
+    ]
+    assert ids[0] == ids[1]
+
+
 @pytest.mark.parametrize("name", ["twice", "cancels", "turned", "shared"])
 def test_a_variable_that_is_used_twice_is_left_to_the_matcher(name):
     assert not plan_of(SINGLE[name], OPTIONS["default"])[0].decision
