@@ -12,7 +12,7 @@ from scenicq.query.execution.run import Query
 from .report import columns, count, printable
 
 if TYPE_CHECKING:  # takes long to load
-    from scenicq.query.explain.advice import Outlook
+    from scenicq.query.explain.advice import ChangeForecast
     from scenicq.query.explain.changes import Change
 
 __all__ = ["advise", "is_nearly_empty"]
@@ -28,7 +28,7 @@ def is_nearly_empty(query: Query) -> bool:
     return query.funnel.matches * _SCARCE < query.funnel.frames
 
 
-def _number(outlook: Outlook) -> str:
+def _number(outlook: ChangeForecast) -> str:
     about = "about " if outlook.sampled else ""
     if outlook.certain:
         return f"{about}{outlook.most:,}"

@@ -29,11 +29,11 @@ from .output import ProgressBar, destination, writing
 from .report import count, show_few
 from .sources import sensor_root
 
-__all__ = ["Wanted", "deliver", "exit_code"]
+__all__ = ["Destination", "deliver", "exit_code"]
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
+class Destination:
     """Where results go.
 
     Attributes:
@@ -56,7 +56,7 @@ class Wanted:
 
 
 def deliver(
-    query: Query, results: Generator[Result], near: Iterable[Result], wanted: Wanted, bar: ProgressBar
+    query: Query, results: Generator[Result], near: Iterable[Result], wanted: Destination, bar: ProgressBar
 ) -> ResultSummary:
     """Write the results of a query, then the near misses, wherever they are wanted.
 
@@ -76,7 +76,7 @@ def deliver(
 
 
 def _deliver(
-    query: Query, results: Generator[Result], near: Iterable[Result], wanted: Wanted, bar: ProgressBar
+    query: Query, results: Generator[Result], near: Iterable[Result], wanted: Destination, bar: ProgressBar
 ) -> ResultSummary:
     started = time.perf_counter()
     unlisted, counted = 0, ResultCount()

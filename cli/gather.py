@@ -9,7 +9,7 @@ from msgspec import UNSET
 
 from scenicq.exporters.forms import FORMS
 from scenicq.query.execution.option_texts import QUERY_OPTIONS
-from scenicq.query.execution.pieces import Gathered
+from scenicq.query.execution.pieces import GatheredPieces
 from scenicq.query.execution.pieces import gather as find_pieces
 from scenicq.query.execution.question_notes import noted_question
 from scenicq.query.execution.recorded_columns import columns_of_records
@@ -19,7 +19,7 @@ from scenicq.query.execution.result_summary import ResultCount
 from scenicq.query.execution.result_tables import roles_of
 from scenicq.store.remote_path import AnyPath
 
-from .deliver import Wanted, deliver, exit_code
+from .deliver import Destination, deliver, exit_code
 from .formats import FORMATS, make_writer
 from .manual import OPEN, Manual
 from .options import add_options
@@ -69,14 +69,14 @@ def gather(ctx: click.Context, folder: AnyPath, *, format_: str | None, output: 
         results = (read_record(each, query.source) for each in gathered.records())
         if selection is not None:
             results = selection.applied(results, query.funnel, lambda found: found)
-        deliver(query, results, (), Wanted(file, form, export, report, sensors=sensors), ProgressBar(quiet=True))
+        deliver(query, results, (), Destination(file, form, export, report, sensors=sensors), ProgressBar(quiet=True))
     if selection is not None and selection.unclear:
         tell_unclear(selection)
     if not exit_zero:
         ctx.exit(exit_code(gathered.funnel, gathered.summary))
 
 
-def _selection(gathered: Gathered, where: str | None, sort: str | None) -> ResultSelection | None:
+def _selection(gathered: GatheredPieces, where: str | None, sort: str | None) -> ResultSelection | None:
     if where is None and sort is None:
         return None
     return ResultSelection.read(where, sort, columns_of_records(gathered.records()))
@@ -86,7 +86,7 @@ def _has_timeline(record: Record) -> bool:
     return isinstance(record, IntervalRecord) and record.timeline is not UNSET
 
 
-def _write(gathered: Gathered, file: AnyPath | None, form: str, selection: ResultSelection | None) -> None:
+def _write(gathered: GatheredPieces, file: AnyPath | None, form: str, selection: ResultSelection | None) -> None:
     with destination(file) as sink, writing(file):
         first = next(gathered.records(), None)
         origin, over_time = (first and first.dataset) or "", isinstance(first, IntervalRecord)

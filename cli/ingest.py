@@ -14,7 +14,7 @@ from scenicq.importers.ingest import IngestSummary
 from scenicq.importers.ingest import ingest as make_dataset
 from scenicq.option_values import Count
 from scenicq.store.atomic_files import whole_folder
-from scenicq.store.manifest import MANIFEST, LeftOut
+from scenicq.store.manifest import MANIFEST, Omission
 from scenicq.store.remote_path import AnyPath, RemotePath
 from scenicq.store.targets import target_of
 
@@ -29,7 +29,7 @@ from .user_folders import map_cache
 __all__ = ["defects", "ingest"]
 
 
-def defects(left_out: tuple[LeftOut, ...]) -> list[str]:
+def defects(left_out: tuple[Omission, ...]) -> list[str]:
     """Lines that say what was left out of a dataset, or kept with a defect; none where all is well."""
     lines: list[str] = []
     for kept, title in ((False, "left out"), (True, "kept with a defect")):

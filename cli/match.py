@@ -29,7 +29,7 @@ from scenicq.store.targets import target_of
 from .advise import advise, is_nearly_empty
 from .combinations import check_combination, check_over_time
 from .datasets import open_checked
-from .deliver import Wanted, deliver, exit_code
+from .deliver import Destination, deliver, exit_code
 from .engine import parse_engine
 from .formats import FORMATS, SPREADSHEET_HELP
 from .funnel import MatchSample, show_funnel
@@ -194,7 +194,7 @@ def match(ctx: click.Context, scenario: str | None, dataset: str | None, *, prog
         results = query.results(bar.advance)
     else:
         results = ordered_results(query, engine, usual_pieces(query, 16), bar.advance)
-    wanted = Wanted(file, chosen, export, report, pieces, sensors, ranked=rank)
+    wanted = Destination(file, chosen, export, report, pieces, sensors, ranked=rank)
 
     def drawn(found: Generator[Result]) -> Generator[Result]:
         return _selected(query, found, sample, rank=rank, diverse=diverse) if rank or sample is not None else found

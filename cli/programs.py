@@ -34,16 +34,21 @@ def read_scenario(path: str | Path) -> Source:
     """Read the program from a file, or from standard input for `-`.
 
     Raises:
-        DataError: file-missing; file-invalid where it is not UTF-8 text; option-invalid where it lies elsewhere.
+        DataError: file-missing; file-invalid where it is not UTF-8 text or cannot be read; option-invalid where it lies
+            elsewhere.
     """
     if str(path) != "-":
         check_here(path)
         return read_program(local_path(str(path)))
-    data: bytes = sys.stdin.buffer.read()
+    if sys.stdin is None:  # pyright: ignore[reportUnnecessaryComparison] - the caller closed it
+        raise DataError(Diagnostic("file-missing", "standard input is closed"))
     try:
-        return Source("<stdin>", data.decode("utf-8-sig"))
+        return Source("<stdin>", sys.stdin.buffer.read().decode("utf-8-sig"))
     except UnicodeDecodeError:
         raise DataError(Diagnostic("file-invalid", "standard input is not text in UTF-8")) from None
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise DataError(Diagnostic("file-invalid", f"standard input cannot be read: {reason}")) from None
 
 
 def given_program(

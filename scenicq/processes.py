@@ -29,7 +29,7 @@ if TYPE_CHECKING:  # whoever starts no process need not load what starts them
     from multiprocessing.context import SpawnProcess
 
 __all__ = [
-    "Lost",
+    "LostTask",
     "Work",
     "Workers",
     "default_processes",
@@ -60,7 +60,7 @@ shift; exec "$@\""""
 
 
 @dataclass(frozen=True, slots=True)
-class Lost:
+class LostTask:
     """In place of an answer: every process that took the task died.
 
     Attributes:
@@ -80,7 +80,7 @@ class _Piece(Generic[Task]):
     tries: int = 0
     given_up: bool = False
     outcome: list[Any] = field(default_factory=list[Any])
-    """Its answer, `Lost` or `_Failure`; empty until there is one."""
+    """Its answer, `LostTask` or `_Failure`; empty until there is one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,7 +142,7 @@ class Workers(Generic[Task, Answer]):
 
     def run(
         self, tasks: Iterable[Task], told: Callable[[Any], None] | None = None, *, tries: int = 3
-    ) -> Generator[tuple[Task, Answer | Lost]]:
+    ) -> Generator[tuple[Task, Answer | LostTask]]:
         """Do tasks side by side, taking a bounded number ahead; may be called while another run waits.
 
         Args:
@@ -243,7 +243,7 @@ class Workers(Generic[Task, Answer]):
             message = "worker processes end before they have started"
             raise DataError(Diagnostic("engine-failed", message, hints=("`--jobs 1` needs none",)))
         if piece.tries >= piece.most:
-            piece.outcome.append(Lost(piece.tries))
+            piece.outcome.append(LostTask(piece.tries))
         else:
             self._waiting.appendleft(piece)
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, cast
 from scenicq.compiler import operators
 from scenicq.compiler.arithmetic import check_hashable, check_weight, is_flat, is_random
 from scenicq.compiler.coerce import property_node, to_heading, to_region, to_scalar, to_vector
-from scenicq.compiler.coroutines import NotBegun, ScenarioCall
+from scenicq.compiler.coroutines import ScenarioCall, ScenarioNotBegunError
 from scenicq.compiler.elements import MISSING, is_of_elements, names_of, of_element, of_network
 from scenicq.compiler.following import follow
 from scenicq.compiler.label_attributes import label_attribute
@@ -123,7 +123,9 @@ def _lookup(run: Interpreter, value: ModelValue, name: str, span: Span) -> Model
         case ScenarioCall():
             names = run.begun(value)
             if names is None:
-                raise NotBegun(Diagnostic("runtime-error", f"the scenario has no `{name}` before it begins", span))
+                raise ScenarioNotBegunError(
+                    Diagnostic("runtime-error", f"the scenario has no `{name}` before it begins", span)
+                )
             return names.get(name, MISSING)
         case ScenicClass():
             return next((cls.attributes[name] for cls in value.ancestry() if name in cls.attributes), MISSING)

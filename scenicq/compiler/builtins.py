@@ -18,7 +18,17 @@ from scenicq.compiler.distributions import DISTRIBUTIONS
 from scenicq.compiler.random_values import is_choice
 from scenicq.compiler.region_functions import REGION_FUNCTIONS
 from scenicq.compiler.rounding import round_number, truncate_number
-from scenicq.compiler.values import Builtin, Choice, Delayed, Instance, ModelValue, ScenicClass, describe, fail, is_node
+from scenicq.compiler.values import (
+    Builtin,
+    Choice,
+    DelayedValue,
+    Instance,
+    ModelValue,
+    ScenicClass,
+    describe,
+    fail,
+    is_node,
+)
 from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.forest.nodes import ArithmeticOp, Constant
@@ -319,7 +329,7 @@ def truth(value: ModelValue, span: Span) -> bool:
                     "use `Uniform(...)` or `Discrete({...})` to choose between values"))  # fmt: skip
     if isinstance(value, Choice):
         raise fail("random-branch", "`if` and loops cannot depend on a random choice", span, "random here")
-    if isinstance(value, Delayed):
+    if isinstance(value, DelayedValue):
         raise fail("wrong-type", "`if` and loops cannot depend on an object that is not there yet", span,
                    "depends on an object's position", ("write `F at V`",))  # fmt: skip
     return bool(value)

@@ -11,7 +11,7 @@ from dataclasses import replace
 from functools import wraps
 from typing import cast
 
-from scenicq.compiler.values import Choice, Delayed, Instance, ModelValue, describe, fail, is_node
+from scenicq.compiler.values import Choice, DelayedValue, Instance, ModelValue, describe, fail, is_node
 from scenicq.errors import Span
 from scenicq.forest.angle_wrap import any_turn
 from scenicq.forest.build import compare, constant, vector
@@ -149,7 +149,7 @@ def _of_each_option(
 @_of_each_option
 def to_node(value: ModelValue, span: Span | None) -> Node:
     """Any value that can be part of an expression."""
-    assert not isinstance(value, Delayed)
+    assert not isinstance(value, DelayedValue)
     if is_node(value):
         return cast(Node, value)
     if isinstance(value, bool | int | float | str) or value is None:

@@ -22,12 +22,12 @@ from scenicq.compiler.coerce import read_over_time
 from scenicq.compiler.coroutines import (
     CoroutineCall,
     DelayedCall,
-    NotBegun,
     ScenarioCall,
     ScenarioDefinition,
+    ScenarioNotBegunError,
     as_behavior,
 )
-from scenicq.compiler.local_values import Held, LocalValues
+from scenicq.compiler.local_values import LocalValues, VariableValue
 from scenicq.compiler.modular import SetUp, set_up
 from scenicq.compiler.overrides import find_overrides
 from scenicq.compiler.process_graph import ProcessGraph, has_circle
@@ -339,14 +339,14 @@ class CompositionGraph(ProcessGraph):
             # those that the scenario runs are others now
             rest = self._losing(rest)
         guards: GraphGuards = ()
-        if isinstance(first, Held):
+        if isinstance(first, VariableValue):
             value = first.value
         else:
             value, guards = self.evaluate(state, first)
         if isinstance(value, DelayedCall):
             value, guards = self.evaluate(state, value.call)
         after = replace(node, waiting=tuple(others))
-        is_named = isinstance(first, Held) or not isinstance(first, ast.Call)
+        is_named = isinstance(first, VariableValue) or not isinstance(first, ast.Call)
         found = self._entered(state, self.as_done(value, node.span), after, rest, is_named=is_named)
         found = ask_guards(guards, found)
         return found if node.begun else Directs(Leave(self.within(state), 0), found)
@@ -634,7 +634,7 @@ class CompositionGraph(ProcessGraph):
         """Go on after a sample; what is asked before what it is about has begun does not hold."""
         try:
             return super().resume(state)
-        except NotBegun:
+        except ScenarioNotBegunError:
             return replace(state, asked=state.asked + 1)
 
     def ask_invariants(self, state: ProcessState, number: int | None = None) -> ProcessState:

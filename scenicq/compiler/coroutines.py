@@ -15,8 +15,18 @@ from scenicq.errors import ScenarioError, Span
 from scenicq.syntax import ast
 
 __all__ = [
-    "BehaviorDefinition", "CoroutineCall", "CoroutineDefinition", "DelayedCall", "LibraryCall", "LibraryName",
-    "MonitorDefinition", "NotBegun", "ScenarioCall", "ScenarioDefinition", "as_behavior", "beside_blocks",
+    "BehaviorDefinition",
+    "CoroutineCall",
+    "CoroutineDefinition",
+    "DelayedCall",
+    "LibraryCall",
+    "LibraryName",
+    "MonitorDefinition",
+    "ScenarioCall",
+    "ScenarioDefinition",
+    "ScenarioNotBegunError",
+    "as_behavior",
+    "beside_blocks",
 ]  # fmt: skip
 
 
@@ -79,7 +89,7 @@ def _is_text(node: ast.Statement) -> bool:
     return isinstance(node, ast.ExpressionStatement) and isinstance(node.value, ast.LiteralValue)
 
 
-class NotBegun(ScenarioError):
+class ScenarioNotBegunError(ScenarioError):
     """What a scenario makes is read before it begins."""
 
 

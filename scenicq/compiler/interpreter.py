@@ -18,9 +18,9 @@ from scenicq.compiler.coroutines import (
     CoroutineCall,
     CoroutineDefinition,
     DelayedCall,
-    NotBegun,
     ScenarioCall,
     ScenarioDefinition,
+    ScenarioNotBegunError,
     beside_blocks,
 )
 from scenicq.compiler.courses import Course
@@ -44,7 +44,7 @@ from scenicq.compiler.timed_statements import leave_out, timed_statement
 from scenicq.compiler.unread import evaluate_when_read
 from scenicq.compiler.values import (
     Choice,
-    Delayed,
+    DelayedValue,
     Function,
     Instance,
     ModelValue,
@@ -154,7 +154,7 @@ class Interpreter:
 
     def name_value(self, name: str, value: ModelValue, scope: Environment, span: Span) -> None:
         """Give a name a value; an object's first name becomes its own."""
-        if isinstance(value, Delayed):
+        if isinstance(value, DelayedValue):
             raise fail("wrong-type", "this needs the position of an object", span, "no object here",
                        ("use it in a specifier, or write `F at V`",))  # fmt: skip
         if name == "ego":
@@ -293,7 +293,7 @@ class Interpreter:
             return definition.computed(instance)
         scope = Environment({"self": instance}, cast(Environment, definition.environment))
         value = evaluate(self, definition.default, scope)
-        while isinstance(value, Delayed):
+        while isinstance(value, DelayedValue):
             value = value.evaluate(instance)
         if leaves_the_plane(definition.name, value):
             raise fail("unsupported-construct", f"this `{definition.name}` is not supported", definition.span,
@@ -414,7 +414,7 @@ class Interpreter:
         """An expression's value; a call that takes what a scenario has not made yet waits until it is done."""
         try:
             return self._value(node, scope)
-        except NotBegun:
+        except ScenarioNotBegunError:
             if not isinstance(node, ast.Call):
                 raise
             return DelayedCall(node)

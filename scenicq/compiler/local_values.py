@@ -21,7 +21,7 @@ from scenicq.forest.nodes import PAST, Constant, Feature, Identity, Index, Leaf,
 from scenicq.forest.value_numbers import ValueNumbers
 from scenicq.forest.walk import is_leaf, leaves, postorder, transform
 
-__all__ = ["HERE", "Held", "LocalValues"]
+__all__ = ["HERE", "LocalValues", "VariableValue"]
 
 
 HERE = "here"
@@ -29,7 +29,7 @@ HERE = "here"
 
 
 @dataclass(frozen=True, slots=True)
-class Held:
+class VariableValue:
     """The value of a variable.
 
     Attributes:
@@ -61,23 +61,23 @@ class LocalValues:
     of_scene: list[range] = field(default_factory=list[range])
     numbers: ValueNumbers = field(default_factory=ValueNumbers)
     _keys: dict[int, tuple[object, Hashable]] = field(default_factory=dict["int", "tuple[object, Hashable]"])
-    _aged: dict[tuple[int, str, bool], tuple[object, Held]] = field(
-        default_factory=dict["tuple[int, str, bool]", "tuple[object, Held]"]
+    _aged: dict[tuple[int, str, bool], tuple[object, VariableValue]] = field(
+        default_factory=dict["tuple[int, str, bool]", "tuple[object, VariableValue]"]
     )
 
-    def hold(self, value: ModelValue) -> Held:
+    def hold(self, value: ModelValue) -> VariableValue:
         """A value."""
         # what may change is looked at again
         if isinstance(value, list | dict | set):
-            return Held(self._key(value), value)
+            return VariableValue(self._key(value), value)
         if id(value) not in self._keys:
             self._keys[id(value)] = value, self._key(value)
-        return Held(self._keys[id(value)][1], value)
+        return VariableValue(self._keys[id(value)][1], value)
 
-    def hold_contract(self, contract: Contract) -> Held:
+    def hold_contract(self, contract: Contract) -> VariableValue:
         """A contract: it is the same where it asks for the same."""
         shows = None if contract.shows is None else self.numbers.expression(contract.shows)
-        return Held(("contract", contract.name, shows, contract.settles_s), contract)
+        return VariableValue(("contract", contract.name, shows, contract.settles_s), contract)
 
     def _key(self, value: ModelValue) -> Hashable:
         match value:
@@ -121,7 +121,7 @@ class LocalValues:
             case _:
                 return value
 
-    def age_value(self, held: Held, place: str, *, first: bool) -> Held:
+    def age_value(self, held: VariableValue, place: str, *, first: bool) -> VariableValue:
         """A value at the next sample.
 
         Args:
@@ -178,7 +178,7 @@ class LocalValues:
         """Whether something of a value is read at each sample."""
         return any(map(_is_current, postorder(self.nodes(value))))
 
-    def _made_old(self, held: Held, place: str, *, first: bool) -> Held:
+    def _made_old(self, held: VariableValue, place: str, *, first: bool) -> VariableValue:
         if not self.reads_samples(held.value):
             return held
 

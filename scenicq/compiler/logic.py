@@ -14,7 +14,7 @@ from scenicq.compiler.courses import as_test, split_by_course
 from scenicq.compiler.environment import Environment
 from scenicq.compiler.known_properties import known_truth
 from scenicq.compiler.random_values import is_choice, lift
-from scenicq.compiler.values import Delayed, ModelValue, fail, is_node
+from scenicq.compiler.values import DelayedValue, ModelValue, fail, is_node
 from scenicq.errors import Span
 from scenicq.forest.nodes import Constant
 from scenicq.syntax import ast
@@ -65,7 +65,7 @@ def _until_decided(run: Interpreter, op: str, values: Iterable[ModelValue], span
     found: list[ModelValue] = []
     with ExitStack() as around:
         for value in values:
-            if isinstance(value, Delayed):
+            if isinstance(value, DelayedValue):
                 raise fail("wrong-type", "this needs the object's position, which is not known here", span)
             found.append(value)
             if not is_random(value):

@@ -22,7 +22,7 @@ from scenicq.forest import build
 from scenicq.forest.nodes import GOING, LAST_LANE, Constant, Node, Vector
 from scenicq.geometry.abstract_map import NeedsMapError
 from scenicq.geometry.elements import Intersection, NetworkElement
-from scenicq.geometry.links import link_named
+from scenicq.geometry.links import find_link
 from scenicq.geometry.network import Network
 from scenicq.geometry.occupancy import ElementAtPoint
 
@@ -106,7 +106,7 @@ def follow_link(run: Interpreter, choice: Choice, name: str, span: Span) -> Mode
     known = run.lookups.abstract.get(id(choice.index))
     if known is None or len(choice.options) != _WITH_NOTHING or choice.options[0] is not known.element:
         raise NeedsMapError
-    found = link_named(known.element.kind, name)
+    found = find_link(known.element.kind, name)
     if found is None or choice.options[1] is not None:
         raise NeedsMapError
     link, needed = found

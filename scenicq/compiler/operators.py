@@ -22,7 +22,7 @@ from scenicq.compiler.coerce import (
     to_vector,
 )
 from scenicq.compiler.roots import oriented_point
-from scenicq.compiler.values import Delayed, Instance, ModelValue, describe, fail, is_node
+from scenicq.compiler.values import DelayedValue, Instance, ModelValue, describe, fail, is_node
 from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.forest.compute import fold
@@ -170,7 +170,7 @@ def relative_to(left: ModelValue, right: ModelValue, span: Span) -> ModelValue:
             position = property_node(instance, "position", span)
             return direction_at(value, position, span) if is_field(value) else to_heading(value, span)
 
-        return Delayed(
+        return DelayedValue(
             frozenset({"position"}),
             lambda instance: build.add(at_object(left, instance), at_object(right, instance), span),
         )

@@ -23,10 +23,9 @@ from scenicq.compiler.courses import forbid_courses, split_by_course
 from scenicq.compiler.environment import Environment
 from scenicq.compiler.exclusions import collect_exclusions
 from scenicq.compiler.items import items_of
-from scenicq.compiler.local_values import HERE, Held, LocalValues
+from scenicq.compiler.local_values import HERE, LocalValues, VariableValue
 from scenicq.compiler.logic import condition
 from scenicq.compiler.process_states import (
-    Asked,
     AskInvariants,
     BeginBehavior,
     BlockFrame,
@@ -36,6 +35,7 @@ from scenicq.compiler.process_states import (
     ForFrame,
     GraphGuards,
     GraphStatement,
+    GuardedTest,
     Idle,
     LibraryFrame,
     LoopItems,
@@ -56,22 +56,22 @@ from scenicq.compiler.process_states import (
     timers_of,
 )  # fmt: skip
 from scenicq.compiler.scoping import bound_names
-from scenicq.compiler.values import Choice, Delayed, Function, Instance, ModelValue, describe, fail
+from scenicq.compiler.values import Choice, DelayedValue, Function, Instance, ModelValue, describe, fail
 from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.forest.nodes import CompareOp, Constant, Feature, Identity, Index, Leaf, Node
 from scenicq.forest.temporal import (
     Activity,
-    Arm,
     Atom,
+    BranchOnTimer,
     Choose,
-    Due,
     End,
     Goto,
     IfRuns,
     Process,
     ProcessStep,
     Reject,
+    StartTimer,
     Stop,
     Terminate,
     Test,
@@ -133,7 +133,9 @@ class ProcessGraph:
     _contracts: dict[Hashable, tuple[tuple[Contract, ...], GraphGuards]] = field(
         default_factory=dict["Hashable", "tuple[tuple[Contract, ...], GraphGuards]"]
     )
-    _items: dict[tuple[Held, ...], LoopItems] = field(default_factory=dict["tuple[Held, ...]", "LoopItems"])
+    _items: dict[tuple[VariableValue, ...], LoopItems] = field(
+        default_factory=dict["tuple[VariableValue, ...]", "LoopItems"]
+    )
     _numbers: dict[ProcessState, int] = field(default_factory=dict["ProcessState", int])
     _todo: list[tuple[int, ProcessState]] = field(default_factory=list["tuple[int, ProcessState]"])
 
@@ -152,7 +154,7 @@ class ProcessGraph:
                 number, state = self._todo.pop()
                 found = self.next_of(state)
                 self.steps[number] = self.make_step(found)
-                if isinstance(found, Asked) and found.loose:
+                if isinstance(found, GuardedTest) and found.loose:
                     self.loose.add(number)
 
     def add(self, step: ProcessStep) -> int:
@@ -191,7 +193,7 @@ class ProcessGraph:
     def make_step(self, found: Following) -> ProcessStep:
         """The step for what happens next."""
         match found:
-            case Asked():
+            case GuardedTest():
                 if isinstance(found.node, Constant):
                     step: ProcessStep = Goto(self.step_number(found.then if found.node.value else found.otherwise))
                 else:
@@ -202,9 +204,9 @@ class ProcessGraph:
             case Ways():
                 return Choose(tuple(dict.fromkeys(map(self.step_number, found.options))))
             case OnTimer():
-                return Due(found.timer, self.step_number(found.then), self.step_number(found.otherwise))
+                return BranchOnTimer(found.timer, self.step_number(found.then), self.step_number(found.otherwise))
             case TimerStarts():
-                return Arm(found.timer, found.after_s, self.step_number(found.then), found.extends)
+                return StartTimer(found.timer, found.after_s, self.step_number(found.then), found.extends)
             case Waits():
                 then, timers = found.then, timers_of(found.then)
                 if self.resumable and then.modes:
@@ -255,7 +257,7 @@ class ProcessGraph:
 
         def evaluated() -> Node:
             value = condition(run, wanted, names)
-            if isinstance(value, Delayed):
+            if isinstance(value, DelayedValue):
                 raise fail("wrong-type", "this needs the position of an object", wanted.span, "no object here",
                            ("write `F at V`",))  # fmt: skip
             return to_boolean(value, wanted.span)
@@ -279,7 +281,7 @@ class ProcessGraph:
         def tested(settled: ModelValue) -> Following:
             if isinstance(settled, Constant) and not guards:
                 return then if settled.value else otherwise
-            return Asked(cast(Node, settled), guards, then, otherwise)
+            return GuardedTest(cast(Node, settled), guards, then, otherwise)
 
         return self.with_drawn(state, node, span, tested)
 
@@ -320,7 +322,7 @@ class ProcessGraph:
 
         return self.with_drawn(state, cast(ModelValue, changed), span, assigned, variables=True)
 
-    def hold_names(self, names: Mapping[str, ModelValue]) -> tuple[tuple[str, Held], ...]:
+    def hold_names(self, names: Mapping[str, ModelValue]) -> tuple[tuple[str, VariableValue], ...]:
         """Variables in the order of their names."""
         return tuple((name, self.values.hold(names[name])) for name in sorted(names))
 
@@ -403,7 +405,7 @@ class ProcessGraph:
         if wanted is None:
             return OnTimer(frame.timer, chosen, following)
         asked = self.ask(state, wanted, chosen, following, self.call_of(state, at))
-        return replace(asked, loose=True) if isinstance(asked, Asked) else asked
+        return replace(asked, loose=True) if isinstance(asked, GuardedTest) else asked
 
     def ask_invariants(self, state: ProcessState, number: int | None = None) -> ProcessState:
         """A state in which the invariants of a call are asked first."""
@@ -439,7 +441,7 @@ class ProcessGraph:
     def waits(self, rest: ProcessState, activity: Span, contracts: Sequence[Contract] = ()) -> Following:
         """Go on with a state at the next sample, by when some contracts must be kept."""
         frames = self.age_frames(rest.frames, "", first=rest.first)
-        found: list[tuple[Held, int]] = []
+        found: list[tuple[VariableValue, int]] = []
         used = timers_of(rest)
         started: list[tuple[int, float]] = []
         for contract in contracts if self.reaction_s is not None else ():
@@ -479,7 +481,7 @@ class ProcessGraph:
         for number, frame in enumerate(frames):
             here = f"{place}{number}"
 
-            def old(held: Held, name: str, here: str = here) -> Held:
+            def old(held: VariableValue, name: str, here: str = here) -> VariableValue:
                 return self.values.age_value(held, f"{here} {name}", first=first)
 
             match frame:
@@ -504,7 +506,7 @@ class ProcessGraph:
                     found.append(frame)
         return tuple(found)
 
-    def old_statement(self, node: GraphStatement, old: Callable[[Held, str], Held]) -> GraphStatement:
+    def old_statement(self, node: GraphStatement, old: Callable[[VariableValue, str], VariableValue]) -> GraphStatement:
         """A statement at the next sample."""
         match node:
             case BeginBehavior():
@@ -527,9 +529,9 @@ class ProcessGraph:
             found = self.test(state, contract.over, (), following, found, self.span)
         asked = guards if not frame.phase and not frame.lasted else ()
         found = ask_guards(asked, found)
-        return replace(found, loose=True) if isinstance(found, Asked) else found
+        return replace(found, loose=True) if isinstance(found, GuardedTest) else found
 
-    def contracts_of(self, held: Held) -> tuple[tuple[Contract, ...], GraphGuards]:
+    def contracts_of(self, held: VariableValue) -> tuple[tuple[Contract, ...], GraphGuards]:
         """The contracts of the phases of a behavior of the libraries."""
         if held.key not in self._contracts:
             call = cast(LibraryCall, held.value)
@@ -634,7 +636,7 @@ class ProcessGraph:
         return fail("unsupported-construct", f"`{word}` in a {self.word} is not supported", span,
                     "is not followed over time")  # fmt: skip
 
-    def items(self, held: tuple[Held, ...]) -> LoopItems:
+    def items(self, held: tuple[VariableValue, ...]) -> LoopItems:
         """What a loop goes through."""
         if held not in self._items:
             self._items[held] = LoopItems(held, not any(self.values.reads_samples(each.value) for each in held))
@@ -797,7 +799,9 @@ class ProcessGraph:
         body = cast("tuple[ast.Statement, ...]", call.of.body)
         return self.push(state, CallFrame(call, self.hold_names(call.given)), BlockFrame(body))
 
-    def follow_choice(self, choice: Choice, following: Callable[[Held], ProcessState], span: Span) -> Following:
+    def follow_choice(
+        self, choice: Choice, following: Callable[[VariableValue], ProcessState], span: Span
+    ) -> Following:
         """Go on with the option that a random choice comes out as: any that is drawn now, or that of the scene."""
         states = [following(self.values.hold(as_behavior(each, span))) for each in choice.options]
         if self.values.drawn_variables(choice.index):
@@ -805,7 +809,7 @@ class ProcessGraph:
         found: Following = states[-1]
         for number in reversed(range(len(states) - 1)):
             node = build.compare(CompareOp.EQ, choice.index, build.constant(float(number)), span)
-            found = Asked(node, (), states[number], found)
+            found = GuardedTest(node, (), states[number], found)
         return found
 
     def pick(self, state: ProcessState, node: PickBehavior, rest: ProcessState) -> Following:
@@ -876,7 +880,7 @@ def process_of(
             for guard in call.of.guards("precondition") + call.of.guards("invariant"):
                 found = graph.ask(start, cast(ast.Expression, guard.operand), End(), Reject(guard.span))
                 match found:
-                    case Asked():
+                    case GuardedTest():
                         asked.append((found.guards, found.node, guard.span))
                     case Reject():
                         asked.append(((), build.constant(False), guard.span))

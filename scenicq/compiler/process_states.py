@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from scenicq.compiler.coroutines import CoroutineCall
-from scenicq.compiler.local_values import Held
+from scenicq.compiler.local_values import VariableValue
 from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.forest.nodes import Node
@@ -28,7 +28,6 @@ from scenicq.syntax import ast
 
 __all__ = [
     "AskInvariants",
-    "Asked",
     "BeginBehavior",
     "BlockFrame",
     "CallFrame",
@@ -38,6 +37,7 @@ __all__ = [
     "ForFrame",
     "GraphGuards",
     "GraphStatement",
+    "GuardedTest",
     "Idle",
     "LibraryFrame",
     "LoopItems",
@@ -70,7 +70,7 @@ class AskInvariants:
 class BeginBehavior:
     """Begins a behavior."""
 
-    what: Held
+    what: VariableValue
     span: Span
 
 
@@ -85,7 +85,7 @@ class PickBehavior:
         span: The statement.
     """
 
-    options: tuple[Held, ...]
+    options: tuple[VariableValue, ...]
     shuffle: bool
     span: Span
     enabled: tuple[bool, ...] = ()
@@ -112,7 +112,7 @@ class EnterScenarios:
         span: The statement.
     """
 
-    waiting: tuple[Held | ast.Expression, ...]
+    waiting: tuple[VariableValue | ast.Expression, ...]
     span: Span
     begun: tuple[RunningScenario, ...] = ()
 
@@ -143,7 +143,7 @@ class LoopItems:
         stays: Whether nothing of it is read at each sample.
     """
 
-    held: tuple[Held, ...]
+    held: tuple[VariableValue, ...]
     stays: bool
 
 
@@ -161,7 +161,7 @@ class CallFrame:
     """A behavior or monitor that runs, with its variables."""
 
     call: CoroutineCall
-    names: tuple[tuple[str, Held], ...]
+    names: tuple[tuple[str, VariableValue], ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,7 +174,7 @@ class LibraryFrame:
         lasted: For how many samples, as far as that matters.
     """
 
-    call: Held
+    call: VariableValue
     phase: int = 0
     lasted: int = 0
 
@@ -264,13 +264,13 @@ class ProcessState:
     guards: tuple[ast.DynamicStatement, ...] = ()
     of: int = -1
     first: bool = True
-    modes: tuple[tuple[Held, int], ...] = ()
+    modes: tuple[tuple[VariableValue, int], ...] = ()
     seen: int = -1
     begun: tuple[tuple[Hashable, int], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class GuardedTest:
     """A test, after what it asks for so that it can be made: a run without that is rejected, at its place.
 
     Attributes:
@@ -290,7 +290,7 @@ class Asked:
 GraphGuards: TypeAlias = tuple[tuple[Node, Span], ...]
 ScenarioStep: TypeAlias = Begin | CheckSample | Stop | Leave | PutBehavior
 _Last: TypeAlias = Terminate | Reject | End | GiveUp
-Following: TypeAlias = "ProcessState | Asked | Ways | OnTimer | TimerStarts | Waits | Directs | OnRunning | _Last"
+Following: TypeAlias = "ProcessState | GuardedTest | Ways | OnTimer | TimerStarts | Waits | Directs | OnRunning | _Last"
 
 
 @dataclass(frozen=True, slots=True)
@@ -356,7 +356,7 @@ def any_of(ways: Sequence[Following]) -> Following:
 
 def ask_guards(guards: GraphGuards, then: Following) -> Following:
     """Ask for what must hold, then go on."""
-    return Asked(build.constant(True), guards, then, then) if guards else then
+    return GuardedTest(build.constant(True), guards, then, then) if guards else then
 
 
 def timers_of(state: ProcessState) -> set[int]:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, cast
 
 from scenicq.compiler.coerce import kind_of_model, to_heading, to_node, to_vector
 from scenicq.compiler.roots import oriented_point
-from scenicq.compiler.values import Choice, Delayed, Instance, ModelValue, fail, is_node
+from scenicq.compiler.values import Choice, DelayedValue, Instance, ModelValue, fail, is_node
 from scenicq.errors import ScenarioError, Span
 from scenicq.forest.nodes import Constant, Identity, Node, Select, Undefined
 from scenicq.limits import LIMITS
@@ -175,14 +175,14 @@ def lift(
         span: The construct.
         spread: Which values to take apart; none if not given.
     """
-    if any(isinstance(value, Delayed) for value in values):
-        needs = frozenset[str]().union(*(value.needs for value in values if isinstance(value, Delayed)))
+    if any(isinstance(value, DelayedValue) for value in values):
+        needs = frozenset[str]().union(*(value.needs for value in values if isinstance(value, DelayedValue)))
 
         def later(instance: Instance) -> ModelValue:
-            known = (value.evaluate(instance) if isinstance(value, Delayed) else value for value in values)
+            known = (value.evaluate(instance) if isinstance(value, DelayedValue) else value for value in values)
             return lift(function, *known, span=span, spread=spread)
 
-        return Delayed(needs, later)
+        return DelayedValue(needs, later)
     choices = [value for value in values if isinstance(value, Choice) and spread and spread(value)]
     if not choices:
         return function(*values)

@@ -14,7 +14,7 @@ from scenicq.compiler.courses import split_by_course
 from scenicq.compiler.environment import Environment
 from scenicq.compiler.exclusions import collect_exclusions
 from scenicq.compiler.requirements import defer_value
-from scenicq.compiler.values import Delayed, ModelValue, describe, fail
+from scenicq.compiler.values import DelayedValue, ModelValue, describe, fail
 from scenicq.errors import Diagnostic, ScenarioError, Span, printable
 from scenicq.forest import build
 from scenicq.forest.kinds import kind_of
@@ -81,7 +81,7 @@ def _as_recorded(value: ModelValue, span: Span) -> Node:
     Raises:
         ScenarioError: wrong-type.
     """
-    kind = None if isinstance(value, Delayed) else kind_of_model(value)
+    kind = None if isinstance(value, DelayedValue) else kind_of_model(value)
     if value is None or (kind not in _RECORDED and kind != "other" and not _is_vector(value)):
         raise fail("wrong-type", "this cannot be recorded", span, f"this is {describe(value)}",
                    ("a number, truth value, vector or text can be",))  # fmt: skip

@@ -12,7 +12,7 @@ from scenicq.compiler.courses import split_by_course
 from scenicq.compiler.environment import Environment
 from scenicq.compiler.logic import condition
 from scenicq.compiler.temporal import is_temporal
-from scenicq.compiler.values import Delayed, ModelValue, fail
+from scenicq.compiler.values import DelayedValue, ModelValue, fail
 from scenicq.errors import Span
 from scenicq.forest.nodes import Node
 from scenicq.syntax import ast, phrases
@@ -60,7 +60,7 @@ def defer(run: Interpreter, wanted: ast.Expression, scope: Environment, span: Sp
 
     def truth() -> Node:
         value = evaluated()
-        if isinstance(value, Delayed):
+        if isinstance(value, DelayedValue):
             raise fail("wrong-type", "this needs the position of an object", wanted.span, "no object here",
                        ("write `F at V`",))  # fmt: skip
         return to_boolean(value, wanted.span)

@@ -16,7 +16,7 @@ from scenicq.compiler.operations import values_of
 from scenicq.compiler.orientations import orientation, surely_gives_a_heading
 from scenicq.compiler.random_values import holds_instances, lift, make_choice, to_common_type
 from scenicq.compiler.specifiers import BoundSpecifier
-from scenicq.compiler.values import Choice, Delayed, Instance, ModelValue, fail
+from scenicq.compiler.values import Choice, DelayedValue, Instance, ModelValue, fail
 from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.forest.compute import fold
@@ -68,7 +68,7 @@ def _specifier(
     modifies: str = "",
     condition: Callable[[Instance], Node] | None = None,
 ) -> BoundSpecifier:
-    delayed = frozenset[str]().union(*(argument.needs for argument in arguments if isinstance(argument, Delayed)))
+    delayed = frozenset[str]().union(*(argument.needs for argument in arguments if isinstance(argument, DelayedValue)))
     return BoundSpecifier(
         frozenset(gives.split()), frozenset(optionally.split()), frozenset(needs.split()) | delayed, evaluate, span,
         rank=rank, modifies=modifies, condition=condition,
@@ -76,7 +76,7 @@ def _specifier(
 
 
 def _known(value: ModelValue, instance: Instance) -> ModelValue:
-    while isinstance(value, Delayed):
+    while isinstance(value, DelayedValue):
         value = value.evaluate(instance)
     return value
 

@@ -19,7 +19,7 @@ from scenicq.syntax import ast
 __all__ = [
     "Builtin",
     "Choice",
-    "Delayed",
+    "DelayedValue",
     "Function",
     "Instance",
     "LabelObjects",
@@ -193,7 +193,7 @@ class Nearest(Instance):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Delayed:
+class DelayedValue:
     """A value that needs properties of the object being specified, such as `10 deg relative to roadDirection`.
 
     Attributes:
@@ -294,7 +294,7 @@ _NAMES: dict[type, str] = {
     Choice: "a random choice",
     LabelObjects: "the other label objects of a class",
     OtherList: "a list of other label objects",
-    Delayed: "a value that depends on an object's position",
+    DelayedValue: "a value that depends on an object's position",
 }
 
 

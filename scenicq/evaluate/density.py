@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from scenicq.errors import CannotEvaluate
 from scenicq.evaluate.expression_arrays import evaluate_arrays
-from scenicq.evaluate.observed_columns import ANGLES, Observed, ObservedColumns
+from scenicq.evaluate.observed_columns import ANGLES, ObservedColumns, ObservedValues
 from scenicq.evaluate.variables import Draws, density_of, point_density
 from scenicq.forest.columns import Array, Data, Vectors, constant_column
 from scenicq.forest.condition import condition
@@ -119,11 +119,11 @@ class GroupDensity:
         """Whether the group has no features to compare: its density is 1."""
         return not self._continuous and not self._finite
 
-    def finite_values(self, label: Observed) -> Iterator[Value]:
+    def finite_values(self, label: ObservedValues) -> Iterator[Value]:
         """The label's values of the features that depend on finite choices alone."""
         return (label[each.object, each.property] for each in self._finite)
 
-    def values(self, labels: Sequence[Observed]) -> GroupValues:
+    def values(self, labels: Sequence[ObservedValues]) -> GroupValues:
         """Work out the densities of some labels, at least one.
 
         Raises:
@@ -177,7 +177,9 @@ class GroupDensity:
         found._conditions = tuple(cast(Condition, each) for each in conditions)
         return found
 
-    def _of_outcomes(self, labels: Sequence[Observed], outcomes: Sequence[tuple[float, GroupDensity]]) -> GroupValues:
+    def _of_outcomes(
+        self, labels: Sequence[ObservedValues], outcomes: Sequence[tuple[float, GroupDensity]]
+    ) -> GroupValues:
         total, square = np.zeros(len(labels)), np.zeros(len(labels))
         for weight, each in outcomes:
             values = each.values(labels)
@@ -190,7 +192,7 @@ class GroupDensity:
             errors = np.where(total > 0, np.sqrt(square) / total, 0.0)
             return GroupValues(np.log(total), errors, np.column_stack(features), np.zeros(len(labels)))
 
-    def _of_some(self, labels: Sequence[Observed]) -> GroupValues:
+    def _of_some(self, labels: Sequence[ObservedValues]) -> GroupValues:
         columns = ObservedColumns(labels)
         if not self._pivots and self._continuous:
             self._pivots = self._choose(columns)

@@ -24,7 +24,7 @@ from scenicq.option_values import Distances
 from scenicq.store.classes import is_class
 from scenicq.store.dataset import Dataset
 
-__all__ = ["DISTANCES", "ERRORS_AT_M", "Detection", "FoundWithin", "Missing", "detect"]
+__all__ = ["DISTANCES", "ERRORS_AT_M", "Detection", "DetectionDistances", "Missing", "detect"]
 
 Reals = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -46,7 +46,7 @@ _AT_ONCE = 200_000
 
 
 @dataclass(frozen=True, slots=True)
-class FoundWithin:
+class DetectionDistances:
     """Centre distances within which objects count as found, metres; each is one of `THRESHOLDS_M`.
 
     Attributes:
@@ -58,7 +58,7 @@ class FoundWithin:
     of_class: Mapping[str, float]
 
     @classmethod
-    def of(cls, said: Mapping[str, float]) -> FoundWithin:
+    def of(cls, said: Mapping[str, float]) -> DetectionDistances:
         """What `DISTANCES` reads."""
         return cls(said.get("", _USUAL_M), {name: value for name, value in said.items() if name})
 
@@ -106,15 +106,15 @@ class Detection:
     distance: Reals
     score: Mapping[float, Reals]
 
-    def found_score(self, within: FoundWithin) -> Reals:
+    def found_score(self, within: DetectionDistances) -> Reals:
         """The score with which each label object was found within the distance of its class, -inf where it was not."""
         return self._by_class(within, self.score, self.object_class)
 
-    def is_false(self, within: FoundWithin) -> Bools:
+    def is_false(self, within: DetectionDistances) -> Bools:
         """Whether each prediction is no label object within the distance of its class."""
         return self._by_class(within, self.owner, self.prediction_class) < 0
 
-    def _by_class(self, within: FoundWithin, values: Mapping[float, NDArray[T]], numbers: Numbers) -> NDArray[T]:
+    def _by_class(self, within: DetectionDistances, values: Mapping[float, NDArray[T]], numbers: Numbers) -> NDArray[T]:
         """The values at the centre distance of each thing's class."""
         found = values[within.usual]
         for number, name in enumerate(self.classes):

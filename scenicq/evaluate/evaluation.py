@@ -23,15 +23,15 @@ from scenicq.evaluate.classes import ClassFigures, class_figures
 from scenicq.evaluate.clusters import find_clusters, parameters_of
 from scenicq.evaluate.comparison import ObjectComparison, ShareComparison, compare
 from scenicq.evaluate.controls import Likeness, number_of
-from scenicq.evaluate.detection import Detection, FoundWithin, detect
+from scenicq.evaluate.detection import Detection, DetectionDistances, detect
 from scenicq.evaluate.evaluation_options import EvaluationOptions, EvaluationTexts, read_evaluation_options
-from scenicq.evaluate.matched import Matched, read_matched
+from scenicq.evaluate.frame_split import FrameSplit, split_frames
 from scenicq.evaluate.paired_models import PairedComparison, compare_pair
 from scenicq.evaluate.paired_runs import pair_runs
 from scenicq.evaluate.resampling import holm, resamples
-from scenicq.evaluate.simulation import Simulated, SimulatedRuns, read_simulated, verdict
+from scenicq.evaluate.simulation import SimulatedRuns, SimulationComparison, read_simulated, verdict
 from scenicq.evaluate.slices import Slice, slices
-from scenicq.evaluate.weighting import Weighted, weigh
+from scenicq.evaluate.weighting import WeightedShare, weigh
 from scenicq.importers.prediction_checks import find_doubts
 from scenicq.importers.prediction_files import read_predictions
 from scenicq.importers.predictions import Predictions
@@ -113,12 +113,12 @@ class ScenarioEvaluation:
     undecided: int
     roles: tuple[ObjectComparison, ...]
     all_objects: ObjectComparison
-    weighted: tuple[Weighted, ...]
+    weighted: tuple[WeightedShare, ...]
     classes: tuple[ClassFigures, ...]
     slices: tuple[Slice, ...]
     balances: tuple[Balance, ...]
     worst: tuple[WorstFrame, ...]
-    simulated: Simulated | None
+    simulated: SimulationComparison | None
     missed: Bools
     mine: Bools
     coincident: tuple[str, ...] = ()
@@ -148,7 +148,7 @@ class Evaluation:
 
     dataset: str
     predictions: str
-    within: FoundWithin
+    within: DetectionDistances
     least_score: float
     scenarios: tuple[ScenarioEvaluation, ...]
     warnings: tuple[Diagnostic, ...]
@@ -224,13 +224,13 @@ def evaluate_models(
     doubts: list[Diagnostic] = []
     judges = {name: _Judge(_detect(each, dataset, asked, doubts), asked) for name, each in predictions.items()}
     any_judge = next(iter(judges.values()))
-    matched: list[Matched] = []
+    matched: list[FrameSplit] = []
     for name, each in named.items():
         records = RecordStream(_records(each, doubts))
         own = _own(name, records, dataset, doubts)
         labels = any_judge.detection
         matched.append(
-            read_matched(name, own, labels.frames, labels.objects, lambda records=records: records.completeness)
+            split_frames(name, own, labels.frames, labels.objects, lambda records=records: records.completeness)
         )
         doubts += _doubt(name, each, records.completeness)
     found = [each.scenario(one) for each in judges.values() for one in matched]
@@ -351,7 +351,7 @@ def _decisive(scenario: ScenarioEvaluation) -> ObjectComparison:
     return max(scenario.headline, key=lambda each: -1.0 if math.isnan(each.difference) else each.difference)
 
 
-def _pairs(judges: Mapping[str, _Judge], matched: Iterable[Matched]) -> Iterator[PairedComparison]:
+def _pairs(judges: Mapping[str, _Judge], matched: Iterable[FrameSplit]) -> Iterator[PairedComparison]:
     """Each model beside each that comes before it."""
     for one in matched:
         for (baseline, before), (model, judge) in combinations(judges.items(), 2):
@@ -443,7 +443,7 @@ class _Judge:
         whole = np.zeros(len(self.detection.frames.names), dtype=np.int64)
         return number_of((whole, *(self._parameters[name][1] for name in names)))
 
-    def scenario(self, matched: Matched) -> ScenarioEvaluation:
+    def scenario(self, matched: FrameSplit) -> ScenarioEvaluation:
         """The figures of one scenario."""
         detection = self.detection
         frame = detection.objects.frame
@@ -485,7 +485,7 @@ class _Judge:
             one_each=not matched.every,
         )
 
-    def beside(self, before: _Judge, matched: Matched) -> Iterator[PairedComparison]:
+    def beside(self, before: _Judge, matched: FrameSplit) -> Iterator[PairedComparison]:
         """What this model misses beside another one, of the objects that count for both."""
         frame = self.detection.objects.frame
         (here, there), (here_too, there_too) = self.frames(matched), before.frames(matched)
@@ -527,12 +527,12 @@ class _Judge:
             )
         return replace(scenario, simulated=verdict(runs, real, paired))
 
-    def frames(self, matched: Matched) -> tuple[Bools, Bools]:
+    def frames(self, matched: FrameSplit) -> tuple[Bools, Bools]:
         """The frames that match, and those that do not, of those that predictions speak of."""
         covered = self.detection.covered
         return matched.matching & covered, matched.decided & ~matched.matching & covered
 
-    def _roles(self, matched: Matched) -> Iterator[tuple[str, Bools]]:
+    def _roles(self, matched: FrameSplit) -> Iterator[tuple[str, Bools]]:
         """The label object of each role."""
         for role in matched.roles:
             mine = np.zeros(len(self.detection.objects.frame), dtype=np.bool_)
@@ -563,7 +563,7 @@ class _Judge:
         one, other = np.unique(value[mine]), np.unique(value[others])
         return bool(len(one) and len(other)) and not np.isin(one, other).any()
 
-    def _weighted(self, log_weight: Reals | None, asked: Iterable[tuple[str, Bools]]) -> Iterator[Weighted]:
+    def _weighted(self, log_weight: Reals | None, asked: Iterable[tuple[str, Bools]]) -> Iterator[WeightedShare]:
         if log_weight is not None:
             for about, mine in asked:
                 numbers = np.flatnonzero(mine)

@@ -9,7 +9,7 @@ from typing import Annotated, TypedDict, Unpack, get_args
 
 from scenicq.evaluate.clusters import CLUSTER_KEYS
 from scenicq.evaluate.comparison import MARGIN
-from scenicq.evaluate.detection import DISTANCES, FoundWithin, Missing
+from scenicq.evaluate.detection import DISTANCES, DetectionDistances, Missing
 from scenicq.option_values import (
     MARGIN_OPTION,
     SCORE,
@@ -37,7 +37,7 @@ class EvaluationTexts(TypedDict, total=False):
     distance_m: Annotated[float | str | Mapping[str, float], Option(
         DISTANCES, "M[,CLASS=M]",
         "Centre distance within which an object counts as found: 0.5, 1, 2 or 4 metres; for some classes another one: "
-        "2,pedestrian=0.5.", _COUNTS, ("--distance",), meaning=FoundWithin.of, default="2")]
+        "2,pedestrian=0.5.", _COUNTS, ("--distance",), meaning=DetectionDistances.of, default="2")]
     least_score: Annotated[float | None, Option(
         SCORE, "S", "Score from which a detection counts, but for average precision; all by default.",
         _COUNTS, ("--min-score",))]
@@ -80,7 +80,7 @@ class EvaluationOptions:
         seed: Seed of the resamples.
     """
 
-    distance_m: FoundWithin
+    distance_m: DetectionDistances
     least_score: float | None
     missing: Missing
     simulated: Path | None

@@ -8,13 +8,13 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from scenicq.errors import CannotEvaluate
-from scenicq.forest.columns import Array, Coded, Data
+from scenicq.forest.columns import Array, CodedValues, Data
 from scenicq.forest.groups import Comparison
 from scenicq.forest.nodes import Value
 
-__all__ = ["ANGLES", "Observed", "ObservedColumns"]
+__all__ = ["ANGLES", "ObservedColumns", "ObservedValues"]
 
-Observed = Mapping[tuple[int, str], Value]
+ObservedValues = Mapping[tuple[int, str], Value]
 """What a label observes: values by object (`PARAMS` for parameters) and property."""
 
 ANGLES = frozenset({"heading"})
@@ -26,7 +26,7 @@ _SLACK = 1e-3
 class ObservedColumns:
     """What labels observe, as arrays of shape (labels, 1)."""
 
-    def __init__(self, labels: Sequence[Observed]) -> None:
+    def __init__(self, labels: Sequence[ObservedValues]) -> None:
         """Take labels that observe the same."""
         self._labels = labels
         self.values: dict[tuple[int, str], Data] = {}
@@ -57,7 +57,7 @@ class ObservedColumns:
         own = self.values[each.object, each.property]
         if isinstance(own, tuple) and isinstance(value, tuple):
             return np.hypot(own[0] - value[0], own[1] - value[1]) <= _SLACK
-        if isinstance(own, Coded) and isinstance(value, Coded):
+        if isinstance(own, CodedValues) and isinstance(value, CodedValues):
             return np.array([[one == other for other in value.options] for one in own.options])[own.which, value.which]
         if isinstance(own, np.ndarray) and isinstance(value, np.ndarray):
             off = np.abs(own - value)
@@ -73,4 +73,4 @@ def _column(values: list[Value]) -> Data:
         return pairs[:, :1], pairs[:, 1:]
     if all(isinstance(value, bool | int | float) for value in values):
         return np.array(values, dtype=np.float64)[:, None]
-    return Coded(np.arange(len(values))[:, None], tuple(values))
+    return CodedValues(np.arange(len(values))[:, None], tuple(values))

@@ -17,7 +17,7 @@ from scenicq.geometry.boxes import corners
 from scenicq.geometry.camera import box_corners, box_edges
 from scenicq.report.backdrop import Backdrop
 from scenicq.report.camera_pictures import SpaceBox, camera_image, space_box
-from scenicq.report.frames import when
+from scenicq.report.frames import format_time
 from scenicq.report.page import page
 from scenicq.report.picture import View, ground, plane_of
 from scenicq.report.scene import draw_object
@@ -215,7 +215,7 @@ class _Model:
 
     def _frame(self, each: ScenarioEvaluation, one: WorstFrame) -> Markup:
         label = self._labels[one.frame]
-        told = f"{one.recording}, {when(label.timestamp_us)}: {one.missed} of {one.of} missed, "
+        told = f"{one.recording}, {format_time(label.timestamp_us)}: {one.missed} of {one.of} missed, "
         told += _counted(one.false, "false box", "false boxes")
         return markup(
             "evaluation", "frame", anchor=self._anchor(each, one), name=one.frame, told=told,

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from scenicq.errors import CannotEvaluate
 from scenicq.evaluate.density import GroupDensity
-from scenicq.evaluate.observed_columns import Observed
+from scenicq.evaluate.observed_columns import ObservedValues
 from scenicq.evaluate.variables import Draws
 from scenicq.evaluate.weighting import log_weights
 from scenicq.forest.groups import PARAMS, Comparison
@@ -55,7 +55,7 @@ def log_densities(
     written = scenario.as_written or scenario
     options = options or MatchOptions()
     signatures: dict[Signature, list[int]] = {}
-    seen: list[Observed] = []
+    seen: list[ObservedValues] = []
     for number, (label, correspondence) in enumerate(labels):
         observed, signature = _observed(written, label, correspondence)
         seen.append(observed)
@@ -67,7 +67,7 @@ def log_densities(
     return [found[number] for number in range(len(labels))]
 
 
-def _observed(scenario: Scenario, label: Label, correspondence: Mapping[str, str]) -> tuple[Observed, Signature]:
+def _observed(scenario: Scenario, label: Label, correspondence: Mapping[str, str]) -> tuple[ObservedValues, Signature]:
     members = {member.id: member for member in label.objects} | {"ego": label.ego}
     observed: dict[tuple[int, str], Value] = {}
     names: list[frozenset[str]] = []
@@ -82,7 +82,12 @@ def _observed(scenario: Scenario, label: Label, correspondence: Mapping[str, str
 
 
 def _of_one_signature(
-    scenario: Scenario, signature: Signature, labels: Sequence[Observed], options: MatchOptions, draws: int, seed: int
+    scenario: Scenario,
+    signature: Signature,
+    labels: Sequence[ObservedValues],
+    options: MatchOptions,
+    draws: int,
+    seed: int,
 ) -> list[LogDensity]:
     names = [owner.name for owner in scenario.objects]
     shared = Draws(draws, seed)

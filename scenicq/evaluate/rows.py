@@ -13,7 +13,7 @@ from scenicq.evaluate.benchmark import BenchmarkFigures
 from scenicq.evaluate.classes import ClassFigures
 from scenicq.evaluate.comparison import ShareComparison, format_points, p_text
 from scenicq.evaluate.controls import PLACES
-from scenicq.evaluate.detection import FoundWithin
+from scenicq.evaluate.detection import DetectionDistances
 from scenicq.evaluate.evaluation import Evaluation, ModelsEvaluation, ScenarioEvaluation
 from scenicq.evaluate.precision import ERRORS
 
@@ -492,7 +492,7 @@ def frame_counts(scenario: ScenarioEvaluation) -> str:
     return f"{told}, {undecided:,} {'is' if undecided == 1 else 'are'} undecided" if undecided else told
 
 
-def tables(scenario: ScenarioEvaluation, within: FoundWithin) -> list[Table]:
+def tables(scenario: ScenarioEvaluation, within: DetectionDistances) -> list[Table]:
     """The tables for people: roles, each class at its centre distance, slices."""
     errors = {(each.category, each.group): each.errors for each in scenario.classes if each.errors}
     told = [name for name in ERRORS if any(name in each for each in errors.values())]

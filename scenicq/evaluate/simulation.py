@@ -16,7 +16,7 @@ from scenicq.evaluate.comparison import ObjectComparison, Says, Share, percent
 from scenicq.evaluate.paired_runs import PairedRuns
 from scenicq.evaluate.resampling import ratio_interval
 
-__all__ = ["Simulated", "SimulatedRuns", "read_simulated", "verdict"]
+__all__ = ["SimulatedRuns", "SimulationComparison", "read_simulated", "verdict"]
 
 _WORDS = {"1": 1.0, "0": 0.0, "true": 1.0, "false": 0.0, "yes": 1.0, "no": 0.0}
 _SAYS: Mapping[Says, str] = {"worse": "for", "better": "against", "no worse": "against", "too little": "too little"}
@@ -43,7 +43,7 @@ class SimulatedRuns:
 
 
 @dataclass(frozen=True, slots=True)
-class Simulated:
+class SimulationComparison:
     """A scenario in simulation and on recordings.
 
     Attributes:
@@ -112,7 +112,7 @@ def _value(text: str, column: str) -> float | None:
     return value if 0 <= value <= 1 else None
 
 
-def verdict(runs: SimulatedRuns, real: ObjectComparison, paired: PairedRuns | None) -> Simulated:
+def verdict(runs: SimulatedRuns, real: ObjectComparison, paired: PairedRuns | None) -> SimulationComparison:
     """Say whether recordings bear out what was simulated.
 
     They speak for it where objects in question are missed more often than others that are alike (p < 0.05), against it
@@ -132,4 +132,4 @@ def verdict(runs: SimulatedRuns, real: ObjectComparison, paired: PairedRuns | No
     share = runs.share
     failed = f"failed in {percent(share)} of {share.of:g} simulated runs; "
     beside = "" if paired is None else f"; {paired.sentence}"
-    return Simulated(share, real.about, says, f"{failed}{real.sentence}: {words}{beside}", paired)
+    return SimulationComparison(share, real.about, says, f"{failed}{real.sentence}: {words}{beside}", paired)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from scenicq.evaluate.comparison import DISTANCES_M, Share, distance_names, share_of
 from scenicq.evaluate.detection import Detection
-from scenicq.evaluate.matched import Matched
+from scenicq.evaluate.frame_split import FrameSplit
 from scenicq.evaluate.resampling import LEVEL
 
 __all__ = ["Slice", "slices"]
@@ -60,7 +60,7 @@ class Slice:
 
 
 def slices(
-    detection: Detection, matched: Matched, missed: Bools, mine: Bools, others: Bools, cluster: Numbers
+    detection: Detection, matched: FrameSplit, missed: Bools, mine: Bools, others: Bools, cluster: Numbers
 ) -> tuple[Slice, ...]:
     """Make all slices with at least two parts; their intervals hold all together in 95 % (Bonferroni).
 
@@ -87,7 +87,7 @@ def slices(
     )
 
 
-def _parts_of(detection: Detection, matched: Matched, mine: Bools) -> Iterator[tuple[str, str, Bools, bool]]:
+def _parts_of(detection: Detection, matched: FrameSplit, mine: Bools) -> Iterator[tuple[str, str, Bools, bool]]:
     """Divide the objects in each way: what divides, a part's name, which objects are in it, and if others can be."""
     objects, frames = detection.objects, detection.frames
     recording = frames.recording[objects.frame].astype(np.int64)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from scenicq.errors import CannotEvaluate
 from scenicq.evaluate.expression_arrays import points_of
-from scenicq.forest.columns import Array, Coded, Data, Placed, Vectors, distances
+from scenicq.forest.columns import Array, CodedValues, Data, PlacedRegions, Vectors, distances
 from scenicq.forest.draws import draw_point
 from scenicq.forest.nodes import (
     DiscAt,
@@ -94,7 +94,7 @@ class Draws:
                 assert_never(leaf)
 
     def _point(self, leaf: PointIn, region: Data) -> Data:
-        if not isinstance(region, Placed):
+        if not isinstance(region, PlacedRegions):
             if leaf.identity not in self._points:
                 self._points[leaf.identity] = self._points_of(region)
             return self._points[leaf.identity]
@@ -113,7 +113,7 @@ class Draws:
 
     def _points_of(self, regions: Data) -> Vectors:
         """Points of whichever region each draw has chosen."""
-        if not isinstance(regions, Coded) or any(size > 1 for size in regions.which.shape[:-1]):
+        if not isinstance(regions, CodedValues) or any(size > 1 for size in regions.which.shape[:-1]):
             raise CannotEvaluate("a point of a region that depends on the label")
         x, y = np.empty((1, self.count)), np.empty((1, self.count))
         which = np.broadcast_to(regions.which, (1, self.count))
@@ -174,9 +174,9 @@ def point_density(region: Data, point: Vectors) -> Array:
     Raises:
         CannotEvaluate: The region has no area of its own, such as a line, or depends on what is hidden.
     """
-    if isinstance(region, Placed):
+    if isinstance(region, PlacedRegions):
         return np.where(distances(region, *point) <= SLACK, 1 / _area(region), 0.0)
-    only = region.options[0] if isinstance(region, Coded) and len(region.options) == 1 else None
+    only = region.options[0] if isinstance(region, CodedValues) and len(region.options) == 1 else None
     if not isinstance(only, Region):
         raise CannotEvaluate("a random point in something that is not a region")
     measured = area(only)
@@ -186,7 +186,7 @@ def point_density(region: Data, point: Vectors) -> Array:
     return contains_many(only, xy).reshape(shape) / measured
 
 
-def _area(region: Placed) -> Array:
+def _area(region: PlacedRegions) -> Array:
     """Square metres."""
     numbers = region.numbers
     match region.node:

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scenicq.evaluate.comparison import Share, percent
 from scenicq.evaluate.resampling import CLUSTERS, effective_number, ratio_interval, sums_by
 
-__all__ = ["Weighted", "log_weights", "weigh"]
+__all__ = ["WeightedShare", "log_weights", "weigh"]
 
 Reals = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -74,7 +74,7 @@ def log_weights(log_density: Reals, values: Reals, finite: Sequence[Hashable], s
 
 
 @dataclass(frozen=True, slots=True)
-class Weighted:
+class WeightedShare:
     """The share of objects missed, were frames spread as the program spreads its scenes.
 
     Attributes:
@@ -105,7 +105,7 @@ class Weighted:
         return text + (": too few recordings for a verdict" if self.recordings < CLUSTERS else "")
 
 
-def weigh(about: str, missed: Bools, log_weight: Reals, cluster: NDArray[np.int64]) -> Weighted:
+def weigh(about: str, missed: Bools, log_weight: Reals, cluster: NDArray[np.int64]) -> WeightedShare:
     """Work out the weighted share of objects that was missed.
 
     Args:
@@ -120,4 +120,4 @@ def weigh(about: str, missed: Bools, log_weight: Reals, cluster: NDArray[np.int6
     total, number, equal = float(of.sum()), effective_number(of), effective_number(weight)
     rate = float(lost.sum()) / total if total else math.nan
     share = Share(float(lost.sum()), total, rate, ratio_interval(lost, of, equal), number)
-    return Weighted(about, share, len(weight), int((~known).sum()), equal, number)
+    return WeightedShare(about, share, len(weight), int((~known).sum()), equal, number)

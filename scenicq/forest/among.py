@@ -16,7 +16,17 @@ from numpy.typing import NDArray
 
 from scenicq.errors import CannotEvaluate
 from scenicq.forest.column_domain import ColumnDomain, first_direction
-from scenicq.forest.columns import DEFINED, UNDEFINED, UNKNOWN, Array, Coded, Column, Data, Placed, truth_of
+from scenicq.forest.columns import (
+    DEFINED,
+    UNDEFINED,
+    UNKNOWN,
+    Array,
+    CodedValues,
+    Column,
+    Data,
+    PlacedRegions,
+    truth_of,
+)
 from scenicq.forest.interpret import Steps, interpret, steps_of
 from scenicq.forest.nodes import ELEMENT, OPEN, RANK, Among, AmongOp, Body, Feature, Leaf, Node
 from scenicq.forest.scenario import Scenario
@@ -205,11 +215,11 @@ def take_rows(column: Column, rows: NDArray[np.intp], n: int) -> Column:
 
     data: Data = column.data
     match data:
-        case Coded():
-            data = Coded(np.broadcast_to(data.which, n)[rows], data.options)
-        case Placed():
+        case CodedValues():
+            data = CodedValues(np.broadcast_to(data.which, n)[rows], data.options)
+        case PlacedRegions():
             x, y = data.center
-            data = Placed(data.node, (take(x), take(y)), tuple(map(take, data.numbers)))
+            data = PlacedRegions(data.node, (take(x), take(y)), tuple(map(take, data.numbers)))
         case (x, y):
             data = take(x), take(y)
         case _:

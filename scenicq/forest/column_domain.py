@@ -22,11 +22,11 @@ from scenicq.forest.columns import (
     UNDEFINED,
     UNKNOWN,
     Array,
-    Coded,
+    CodedValues,
     Column,
     ColumnPlaces,
     Data,
-    Placed,
+    PlacedRegions,
     Vectors,
     common_status,
     constant_column,
@@ -259,11 +259,11 @@ class ColumnDomain:
         if len(pairs) == len(data):
             x, y = (_picked(which, [pair[axis] for pair in pairs]) for axis in (0, 1))
             return Column((x, y), status)
-        coded = [each for each in data if isinstance(each, Coded)]
+        coded = [each for each in data if isinstance(each, CodedValues)]
         if len(coded) == len(data):
             starts = np.cumsum([0, *(len(each.options) for each in coded)])
             codes = [each.which + start for each, start in zip(coded, starts[:-1].tolist(), strict=True)]
-            return Column(Coded(_picked(which, codes), sum((each.options for each in coded), ())), status)
+            return Column(CodedValues(_picked(which, codes), sum((each.options for each in coded), ())), status)
         chosen = [Column(each.data, status) for each in (index, *options)]
         return self._each(lambda values: values[1 + int(cast(float, values[0]))], chosen)
 
@@ -273,7 +273,11 @@ class ColumnDomain:
         """What a region or vector field says of points or of other regions."""
         if isinstance(node, DirectionAt):
             return self._direction(node, *args)
-        if isinstance(node, CourseCoordinate) and isinstance(args[0].data, Coded) and isinstance(args[1].data, tuple):
+        if (
+            isinstance(node, CourseCoordinate)
+            and isinstance(args[0].data, CodedValues)
+            and isinstance(args[1].data, tuple)
+        ):
             return self._course_coordinate(node, args[0].data, args)
         if isinstance(node, Measure) and node.measure == "time_to_collision":
             data = [arg.data for arg in args]
@@ -282,12 +286,16 @@ class ColumnDomain:
                 return Column(time_to_collision(*boxes), common_status(args))
         if isinstance(node, Contains | Distance) and isinstance(args[1].data, tuple):
             shape, point = args[0].data, args[1].data
-            if isinstance(shape, Placed):
+            if isinstance(shape, PlacedRegions):
                 away = distances(shape, *point)
                 return Column(away <= SLACK if isinstance(node, Contains) else away, common_status(args))
-            if isinstance(shape, Coded):
+            if isinstance(shape, CodedValues):
                 return self._of_regions(node, shape, args, partial(_of_points, node, point))
-        if isinstance(node, Encloses) and isinstance(args[0].data, Coded) and isinstance(args[1].data, Placed):
+        if (
+            isinstance(node, Encloses)
+            and isinstance(args[0].data, CodedValues)
+            and isinstance(args[1].data, PlacedRegions)
+        ):
             box = args[1].data
             if isinstance(box.node, RectangleAt):
                 return self._of_regions(node, args[0].data, args, partial(_of_boxes, box))
@@ -299,13 +307,13 @@ class ColumnDomain:
         numbers = tuple(arg.data for arg in args[1:] if isinstance(arg.data, np.ndarray))
         known = len(numbers) == len(args) - 1
         if isinstance(node, DiscAt | SectorAt | RectangleAt) and isinstance(center, tuple) and known:
-            return Column(Placed(node, center, numbers), common_status(args))
+            return Column(PlacedRegions(node, center, numbers), common_status(args))
         return self._each(partial(compute, node), args)
 
     def _of_regions(
         self,
         node: OnMap,
-        regions: Coded,
+        regions: CodedValues,
         args: Sequence[Column],
         ask: Callable[[Region, ColumnPlaces, NDArray[np.intp]], Array],
     ) -> Column:
@@ -327,7 +335,7 @@ class ColumnDomain:
             return Column(np.full(1, np.nan), places.status.reshape(places.shape))
         return Column(found.reshape(places.shape), places.status.reshape(places.shape))
 
-    def _course_coordinate(self, node: CourseCoordinate, courses: Coded, args: Sequence[Column]) -> Column:
+    def _course_coordinate(self, node: CourseCoordinate, courses: CodedValues, args: Sequence[Column]) -> Column:
         places = ColumnPlaces((*args,))
         self._check(len(places.defined), "courses")
         which: list[int] = places.spread(courses.which)[places.defined].tolist()
@@ -397,7 +405,7 @@ def _of_points(
     return contains_many(region, xy) if isinstance(node, Contains) else distance_many(region, xy)
 
 
-def _of_boxes(box: Placed, region: Region, places: ColumnPlaces, mine: NDArray[np.intp]) -> Array:
+def _of_boxes(box: PlacedRegions, region: Region, places: ColumnPlaces, mine: NDArray[np.intp]) -> Array:
     if not isinstance(region, PolygonSet):
         raise CannotEvaluate("whether a box lies in it")
     numbers = [places.spread(each)[mine] for each in (*box.center, *box.numbers)]
@@ -414,8 +422,8 @@ def _of_one_kind(options: Sequence[Column]) -> list[Data]:
     defined = [bool((option.status == DEFINED).any()) for option in options]
     there = [option.data for option, is_there in zip(options, defined, strict=True) if is_there]
     nothing: Data = np.full(1, np.nan)
-    if there and isinstance(there[0], Coded):
-        nothing = Coded(np.zeros(1, np.intp), (None,))
+    if there and isinstance(there[0], CodedValues):
+        nothing = CodedValues(np.zeros(1, np.intp), (None,))
     elif there and isinstance(there[0], tuple):
         nothing = (np.full(1, np.nan), np.full(1, np.nan))
     return [option.data if is_there else nothing for option, is_there in zip(options, defined, strict=True)]
@@ -443,7 +451,7 @@ def _allowed(
     """The headings that a field allows at each defined place."""
     if not len(places.defined):
         return ()
-    xy, fields = places.points(point), cast(Coded, field)
+    xy, fields = places.points(point), cast(CodedValues, field)
     only = fields.options[0] if len(fields.options) == 1 else None
     if only is not None and not isinstance(only, Undefined):
         if isinstance(only, ElementAtPoint) and isinstance(going, np.ndarray):

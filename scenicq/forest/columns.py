@@ -23,11 +23,11 @@ __all__ = [
     "UNDEFINED",
     "UNKNOWN",
     "Array",
-    "Coded",
+    "CodedValues",
     "Column",
     "ColumnPlaces",
     "Data",
-    "Placed",
+    "PlacedRegions",
     "Vectors",
     "arrays_of",
     "column_of",
@@ -47,7 +47,7 @@ DEFINED, UNDEFINED, UNKNOWN = np.int8(0), np.int8(1), np.int8(2)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Coded:
+class CodedValues:
     """Values that are neither numbers nor vectors, as indices into a list.
 
     Attributes:
@@ -60,7 +60,7 @@ class Coded:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Placed:
+class PlacedRegions:
     """Discs, sectors or rectangles, one at each place.
 
     Attributes:
@@ -74,7 +74,7 @@ class Placed:
     numbers: tuple[Array, ...]
 
 
-Data: TypeAlias = "Array | Vectors | Coded | Placed"
+Data: TypeAlias = "Array | Vectors | CodedValues | PlacedRegions"
 """Numbers or truth values, the coordinates of vectors, or other values; meaningless where nothing is defined."""
 
 
@@ -112,7 +112,7 @@ class ColumnPlaces:
         code: Array = np.zeros(len(self.defined), dtype=np.intp)
         for column in columns:
             data = column.data
-            if isinstance(data, Coded):
+            if isinstance(data, CodedValues):
                 code = code * len(data.options) + self.spread(data.which)[self.defined]
             elif any(part.size > 1 for part in _parts(column)[:-1]):
                 return self.defined, np.arange(len(self.defined))
@@ -133,14 +133,16 @@ def constant_column(value: Value) -> Column:
         return Column(np.array([value]), status)
     if isinstance(value, tuple):
         return Column((np.array([value[0]]), np.array([value[1]])), status)
-    return Column(np.full(1, np.nan) if isinstance(value, Undefined) else Coded(np.zeros(1, np.intp), (value,)), status)
+    return Column(
+        np.full(1, np.nan) if isinstance(value, Undefined) else CodedValues(np.zeros(1, np.intp), (value,)), status
+    )
 
 
 def truth_of(data: Data) -> Array:
     """Whether values count as true in Python."""
     if isinstance(data, np.ndarray):
         return data if data.dtype == np.bool_ else np.not_equal(data, 0)
-    if isinstance(data, Coded):
+    if isinstance(data, CodedValues):
         return np.array([bool(option) for option in data.options])[data.which]
     return np.ones(1, dtype=np.bool_)
 
@@ -160,12 +162,12 @@ def _parts(column: Column) -> tuple[Array, ...]:
 
 def arrays_of(data: Data) -> tuple[Array, ...]:
     """The arrays that values are made of."""
-    if isinstance(data, Placed):
+    if isinstance(data, PlacedRegions):
         return *data.center, *data.numbers
-    return data if isinstance(data, tuple) else (data.which if isinstance(data, Coded) else data,)
+    return data if isinstance(data, tuple) else (data.which if isinstance(data, CodedValues) else data,)
 
 
-def distances(shape: Placed, x: Array, y: Array) -> Array:
+def distances(shape: PlacedRegions, x: Array, y: Array) -> Array:
     """Distances in metres from points to regions."""
     dx, dy = x - shape.center[0], y - shape.center[1]
     match shape.node:
@@ -180,7 +182,7 @@ def distances(shape: Placed, x: Array, y: Array) -> Array:
 def value_reader(data: Data, shape: tuple[int, ...]) -> Callable[[int], Value]:
     """A function that gives the value at a place, of all places flattened."""
     arrays = [np.broadcast_to(each, shape).ravel() for each in arrays_of(data)]
-    if isinstance(data, Placed):
+    if isinstance(data, PlacedRegions):
         node: Node = data.node
 
         def region(place: int) -> Value:
@@ -188,7 +190,7 @@ def value_reader(data: Data, shape: tuple[int, ...]) -> Callable[[int], Value]:
             return compute(node, ((x, y), *numbers))
 
         return region
-    if isinstance(data, Coded):
+    if isinstance(data, CodedValues):
         options = data.options
         return lambda place: options[int(arrays[0][place])]
     if isinstance(data, tuple):
@@ -210,4 +212,4 @@ def pack_values(values: Sequence[Value], said: Sequence[np.int8], code: NDArray[
         pairs = [value if isinstance(value, tuple) else (np.nan, np.nan) for value in values]
         x, y = np.array(pairs, dtype=np.float64).T
         return x[code], y[code]
-    return Coded(code, tuple(values))
+    return CodedValues(code, tuple(values))

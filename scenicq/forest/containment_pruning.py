@@ -84,7 +84,7 @@ class _Cutter:
         for (number, by), container in asked.items():
             if (number, by) not in self.eroded:
                 outer = _area(container)
-                self.eroded[number, by] = None if outer is None else shapes.eroded(outer, by)
+                self.eroded[number, by] = None if outer is None else shapes.erode(outer, by)
             inner = self.eroded[number, by]
             area = area if inner is None else shapes.intersection(area, inner)
         parts = cast("tuple[Polygon, ...]", shapes.polygonal_part(area))

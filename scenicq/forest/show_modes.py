@@ -14,15 +14,15 @@ from scenicq.forest.nodes import Node
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.temporal import (
     Activity,
-    Arm,
+    BranchOnTimer,
     Choose,
-    Due,
     Dynamics,
     End,
     GiveUp,
     IfRuns,
     Process,
     Reject,
+    StartTimer,
     Terminate,
     Test,
     Wait,
@@ -181,13 +181,13 @@ def _ways(
             case Test():
                 text = _condition(conditions[step.condition.number])
                 stack += [(step.otherwise, (*told, f"not {text}"), seen), (step.then, (*told, text), seen)]
-            case Due():
+            case BranchOnTimer():
                 stack += [(step.otherwise, told, seen), (step.then, (*told, "its time is over"), seen)]
             case IfRuns():
                 stack += [(step.otherwise, (*told, "a scenario is over"), seen), (step.then, told, seen)]
             case Choose():
                 stack += [(each, (*told, "it chooses so"), seen) for each in reversed(step.options)]
-            case Arm():
+            case StartTimer():
                 stack.append((step.then, told, seen))
             case _:
                 stack += [(each, told, seen) for each in successors(step)]

@@ -17,12 +17,11 @@ __all__ = [
     "Activity",
     "Always",
     "And",
-    "Arm",
     "Atom",
     "Begin",
+    "BranchOnTimer",
     "CheckSample",
     "Choose",
-    "Due",
     "Dynamics",
     "End",
     "Eventually",
@@ -38,6 +37,7 @@ __all__ = [
     "ProcessStep",
     "PutBehavior",
     "Reject",
+    "StartTimer",
     "Stop",
     "SubScenario",
     "TemporalRequirement",
@@ -202,7 +202,7 @@ class Wait:
 
 
 @dataclass(frozen=True, slots=True)
-class Arm:
+class StartTimer:
     """Starts a timer, and goes on with another step within the same sample.
 
     Attributes:
@@ -219,7 +219,7 @@ class Arm:
 
 
 @dataclass(frozen=True, slots=True)
-class Due:
+class BranchOnTimer:
     """Goes on with one of two steps, within the same sample, by whether the time of a timer is over."""
 
     timer: int
@@ -322,8 +322,8 @@ ProcessStep: TypeAlias = (
     Test
     | Goto
     | Wait
-    | Arm
-    | Due
+    | StartTimer
+    | BranchOnTimer
     | Choose
     | Terminate
     | Reject
@@ -341,9 +341,9 @@ ProcessStep: TypeAlias = (
 def successors(step: ProcessStep) -> tuple[int, ...]:
     """The steps that may follow one within the same sample."""
     match step:
-        case Test() | Due() | IfRuns():
+        case Test() | BranchOnTimer() | IfRuns():
             return step.then, step.otherwise
-        case Goto() | Arm() | Begin() | CheckSample() | Stop() | Leave() | PutBehavior():
+        case Goto() | StartTimer() | Begin() | CheckSample() | Stop() | Leave() | PutBehavior():
             return (step.then,)
         case Choose():
             return step.options

@@ -18,7 +18,16 @@ from numpy.typing import NDArray
 from scenicq.geometry import shapes
 from scenicq.geometry.shapes import Bounds, Shape
 
-__all__ = ["Guard", "HalfPlane", "Nearer", "Off", "Within", "half_planes", "narrowed", "segment_distances"]
+__all__ = [
+    "Guard",
+    "HalfPlane",
+    "NearestSegment",
+    "OutsidePolygon",
+    "Within",
+    "half_planes",
+    "narrow_guards",
+    "segment_distances",
+]
 
 _ROUNDING = 1e-7
 """Metres that a comparison of distances may be off before it excludes a point."""
@@ -30,7 +39,7 @@ Segments: TypeAlias = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Nearer:
+class NearestSegment:
     """One of a cell's own segments is at least as near as every rival.
 
     Attributes:
@@ -43,7 +52,7 @@ class Nearer:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Off:
+class OutsidePolygon:
     """The point lies outside of a polygon, or on its border."""
 
     area: Shape
@@ -57,7 +66,7 @@ class Within:
     reach: float
 
 
-Guard: TypeAlias = Nearer | Off | Within
+Guard: TypeAlias = NearestSegment | OutsidePolygon | Within
 
 HalfPlane: TypeAlias = tuple[float, float, float]
 """The points with a x + b y <= c, from a, b and c, in metres."""
@@ -74,7 +83,7 @@ def segment_distances(xy: NDArray[np.float64], segments: Segments) -> NDArray[np
     return np.hypot(x - (from_x + share * along_x), y - (from_y + share * along_y))
 
 
-def narrowed(guards: Sequence[Guard], bounds: Bounds) -> tuple[Guard, ...] | None:
+def narrow_guards(guards: Sequence[Guard], bounds: Bounds) -> tuple[Guard, ...] | None:
     """What guards still demand of the points of a box.
 
     Args:
@@ -109,10 +118,10 @@ def half_planes(guards: Sequence[Guard], bounds: Bounds) -> list[HalfPlane]:
     middle = places.mean(axis=0)
     found: list[HalfPlane] = []
     for guard in guards:
-        if isinstance(guard, Off) or len(guard.own) > 1:
+        if isinstance(guard, OutsidePolygon) or len(guard.own) > 1:
             continue
         (own,), (slope,) = _tangents(middle, guard.own)
-        rivals = guard.rivals if isinstance(guard, Nearer) else np.empty((0, 4))
+        rivals = guard.rivals if isinstance(guard, NearestSegment) else np.empty((0, 4))
         away, slopes = _tangents(middle, rivals)
         over = segment_distances(places[:, None], rivals) - away - (places - middle) @ slopes.T
         limits = away - own + over.max(axis=0, initial=0.0)
@@ -141,9 +150,9 @@ def _box(bounds: Bounds) -> Shape:
 def _narrowed(guard: Guard, bounds: Bounds, middle: NDArray[np.float64], reach: float) -> Guard | bool:
     """What is left of a guard for points within a reach of the middle; whether it holds if that is decided."""
     match guard:
-        case Nearer():
+        case NearestSegment():
             return _nearer(guard, middle, reach)
-        case Off():
+        case OutsidePolygon():
             box = _box(bounds)
             if shapes.distance(guard.area, box) > _ROUNDING:
                 return True
@@ -158,7 +167,7 @@ def _narrowed(guard: Guard, bounds: Bounds, middle: NDArray[np.float64], reach: 
             assert_never(guard)
 
 
-def _nearer(guard: Nearer, middle: NDArray[np.float64], reach: float) -> Guard | bool:
+def _nearer(guard: NearestSegment, middle: NDArray[np.float64], reach: float) -> Guard | bool:
     own, rivals = segment_distances(middle, guard.own), segment_distances(middle, guard.rivals)
     # distances change by no more than the way: what is farther than this can be nearest nowhere in the box
     limit = 2 * reach + _ROUNDING
@@ -166,4 +175,4 @@ def _nearer(guard: Nearer, middle: NDArray[np.float64], reach: float) -> Guard |
         return False
     if own.min() + 2 * reach <= rivals.min():
         return True
-    return Nearer(guard.own[own <= own.min() + limit], guard.rivals[rivals <= rivals.min() + limit])
+    return NearestSegment(guard.own[own <= own.min() + limit], guard.rivals[rivals <= rivals.min() + limit])

@@ -82,7 +82,7 @@ class DirectedAreas:
     @cached_property
     def areas(self) -> NDArray[np.object_]:
         """The areas, prepared."""
-        return shapes.prepared([area for area, _ in self.directed])
+        return shapes.prepare([area for area, _ in self.directed])
 
     @cached_property
     def tree(self) -> STRtree:

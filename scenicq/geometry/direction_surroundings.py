@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from scenicq.budget import look
 from scenicq.geometry import shapes
-from scenicq.geometry.cell_guards import Guard, Nearer, Off, Within, segment_distances
+from scenicq.geometry.cell_guards import Guard, NearestSegment, OutsidePolygon, Within, segment_distances
 from scenicq.geometry.cells import joined_boxes
 from scenicq.geometry.directed_areas import TIE, DirectedAreas
 from scenicq.geometry.fields import FieldCell
@@ -147,7 +147,7 @@ class OffLanes:
     def _guarded(self, square: Bounds, near: Sequence[_Candidate]) -> list[FieldCell]:
         """A square where several headings are possible, once for each lane and heading, with what decides."""
         corners, box = _corners(square), shapes.box(*square)
-        off = [Off(area) for _, area in self._within(box, 0.0)]
+        off = [OutsidePolygon(area) for _, area in self._within(box, 0.0)]
         nearest = self.lanes if not len(self.elsewhere) else self.elsewhere
         edges = {} if nearest is self.elsewhere else {each.lane: shapes.edges(self._area(each.lane)) for each in near}
         cells: list[FieldCell] = []
@@ -156,13 +156,13 @@ class OffLanes:
             rivals = [edges[other] for other in edges if other != lane]
             common: list[Guard] = [*off]
             if rivals:
-                common.append(Nearer(edges[lane], np.concatenate(rivals)))
+                common.append(NearestSegment(edges[lane], np.concatenate(rivals)))
             if edges and not each.sure:
                 common.append(Within(edges[lane], self.farthest))
             segments = nearest.directed[lane][1]
             for heading, own in by_heading.items():
                 others = [index for key, indices in by_heading.items() if key != heading for index in indices]
-                guards = [*common, *([Nearer(segments[own], segments[others])] if others else [])]
+                guards = [*common, *([NearestSegment(segments[own], segments[others])] if others else [])]
                 cell = FieldCell(corners, heading, tuple(guards)).part(square)
                 if cell is not None:
                     cells.append(cell)

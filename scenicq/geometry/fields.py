@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.budget import look
-from scenicq.geometry.cell_guards import Guard, narrowed
+from scenicq.geometry.cell_guards import Guard, narrow_guards
 from scenicq.geometry.shapes import Bounds, Shape
 
 __all__ = ["FieldCell", "VectorField"]
@@ -43,7 +43,7 @@ class FieldCell:
         if not self.guards:
             return self
         look()
-        left = narrowed(self.guards, bounds)
+        left = narrow_guards(self.guards, bounds)
         return None if left is None else FieldCell(self.polygon, self.heading, left)
 
 

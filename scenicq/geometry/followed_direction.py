@@ -129,7 +129,7 @@ class FollowedDirection(RoadDirection):
 
     @cached_property
     def _paved(self) -> NDArray[np.object_]:
-        return shapes.prepared(self.paved)
+        return shapes.prepare(self.paved)
 
     @cached_property
     def _paved_tree(self) -> STRtree:

@@ -13,7 +13,7 @@ from scenicq.geometry.elements import LaneSection, NetworkElement
 from scenicq.geometry.features import MapFeature
 from scenicq.geometry.network_builder import relate_elements
 
-__all__ = ["DIRECTS", "IS_SECTION", "LINKS", "Link", "link_named", "links_of"]
+__all__ = ["DIRECTS", "IS_SECTION", "LINKS", "Link", "find_link", "links_of"]
 
 DIRECTS = "directs"
 """The link from each lane to a group or road that has the direction of the lane where it is in the lane."""
@@ -59,7 +59,7 @@ class Link(NamedTuple):
     target: str
 
 
-def link_named(kind: str, attribute: str) -> tuple[str, bool] | None:
+def find_link(kind: str, attribute: str) -> tuple[str, bool] | None:
     """The link that an attribute of the elements of a kind is, and whether there is no scene where there is none.
 
     Args:

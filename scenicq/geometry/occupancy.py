@@ -341,12 +341,12 @@ class Occupancy:
         """The pieces of one area and of its border, the first those that lie in it."""
         if (level, hit) not in self._pieces:
             area, number, _ = self.layers[level][hit]
-            inside = shapes.divided(area, self._crossing(self._trees, area))
+            inside = shapes.divide_polygon(area, self._crossing(self._trees, area))
             rest = shapes.difference(shapes.band(area, TOLERANCE), shapes.union_all(self._meeting(self._trees, area)))
             border = [
                 part
                 for ring in shapes.polygonal_part(rest)
-                for part in shapes.divided(ring, self._crossing(self._wider_trees, ring))
+                for part in shapes.divide_polygon(ring, self._crossing(self._wider_trees, ring))
             ]
             self._pieces[level, hit] = [
                 Piece(cell, found, number)

@@ -48,7 +48,7 @@ def areas_everywhere(areas: Sequence[Shape]) -> list[list[HeldPart]]:
 def _parts(areas: Sequence[Shape]) -> list[HeldPart]:
     tree = STRtree(shapes.array(areas))
     whole = shapes.box(*_grown(areas, 1.0))
-    faces = [face for face in shapes.divided(whole, areas) if face.area > _LEAST]
+    faces = [face for face in shapes.divide_polygon(whole, areas) if face.area > _LEAST]
     middles = shapes.points(np.array([shapes.inner_point(face) for face in faces]))
     held: list[list[int]] = [[] for _ in faces]
     face_numbers, area_numbers = shapes.tree_pairs_within(tree, middles, 0.0)

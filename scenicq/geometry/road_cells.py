@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.geometry import shapes
-from scenicq.geometry.cell_guards import Nearer, segment_distances
+from scenicq.geometry.cell_guards import NearestSegment, segment_distances
 from scenicq.geometry.cells import convex_parts
 from scenicq.geometry.fields import FieldCell
 from scenicq.geometry.shapes import Shape
@@ -60,7 +60,7 @@ def segment_cells(
     cells: list[FieldCell] = []
     for exact in (True, False):
         outlines = [piece.outline for piece in pieces if (not piece.rivals) == exact]
-        guards = () if exact else (Nearer(segments[index][None], segments[rivals]),)
+        guards = () if exact else (NearestSegment(segments[index][None], segments[rivals]),)
         for part in _joined(outlines):
             cells.append(FieldCell(part, float(headings[index]), guards))
     return cells

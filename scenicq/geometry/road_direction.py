@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from shapely import LineString
 
 from scenicq.geometry import shapes
-from scenicq.geometry.cell_guards import Off
+from scenicq.geometry.cell_guards import OutsidePolygon
 from scenicq.geometry.directed_areas import ONE_HEADING, TIE, AreaPairs, DirectedAreas, DirectedLane, distinct_pairs
 from scenicq.geometry.direction_surroundings import OffLanes
 from scenicq.geometry.fields import FieldCell
@@ -127,16 +127,16 @@ class RoadDirection:
                 found += [part] if part is not None else []
         return found + self._surroundings.cells(bounds)
 
-    def _off_lanes(self, number: int) -> tuple[Off, ...]:
+    def _off_lanes(self, number: int) -> tuple[OutsidePolygon, ...]:
         """The lanes that meet one of what is beside them, where it does not count."""
         if number not in self._met:
             own = self._beside.directed[number][0]
             meeting: list[int] = np.sort(shapes.tree_within(self._lanes.tree, own, 0.0)).tolist()
-            self._met[number] = tuple(Off(self._lanes.directed[lane][0]) for lane in meeting)
+            self._met[number] = tuple(OutsidePolygon(self._lanes.directed[lane][0]) for lane in meeting)
         return self._met[number]
 
     @cached_property
-    def _met(self) -> dict[int, tuple[Off, ...]]:
+    def _met(self) -> dict[int, tuple[OutsidePolygon, ...]]:
         return {}
 
     @cached_property

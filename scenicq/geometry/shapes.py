@@ -155,7 +155,7 @@ def covers(a: Shape, b: Shape) -> bool:
     return bool(shapely.covers(a, b))
 
 
-def prepared(geometries: Sequence[Shape]) -> NDArray[np.object_]:
+def prepare(geometries: Sequence[Shape]) -> NDArray[np.object_]:
     """The geometries as an array, indexed so that comparing those of many corners with many others is fast."""
     found = array(geometries)
     shapely.prepare(found)
@@ -282,7 +282,7 @@ def round_band(shape: Shape, width: float) -> Shape:
     return cast(Shape, shapely.buffer(shape, width, quad_segs=64))
 
 
-def divided(shape: Shape, others: Sequence[Shape]) -> tuple[Shape, ...]:
+def divide_polygon(shape: Shape, others: Sequence[Shape]) -> tuple[Shape, ...]:
     """A polygon cut along the borders of others: its parts, each inside or outside of any of them."""
     if not others:
         return (shape,)
@@ -318,7 +318,7 @@ def voronoi_cells(places: Coordinates, bounds: Bounds) -> list[Shape]:
     return cast("list[Shape]", found.tolist())
 
 
-def eroded(shape: Shape, by: float) -> Shape:
+def erode(shape: Shape, by: float) -> Shape:
     """A polygon without what lies within `by` metres of its boundary; slits narrower than 2 mm count as closed."""
     return shapely.buffer(shapely.buffer(shape, _SLIT, quad_segs=4), -by - _SLIT, quad_segs=4)
 

@@ -30,7 +30,7 @@ from scenicq.importers.segments import (
     map_digests,
     write_segments,
 )
-from scenicq.store.manifest import LeftOut, Manifest, Provenance, is_dataset
+from scenicq.store.manifest import Manifest, Omission, Provenance, is_dataset
 from scenicq.store.segment import SEGMENT_OBJECTS, is_whole, read_segments, segments_of
 from scenicq.store.writer import DatasetWriter
 
@@ -68,7 +68,7 @@ class IngestSummary:
     recordings: int
     reused: int
     by_class: Mapping[str, int]
-    left_out: tuple[LeftOut, ...]
+    left_out: tuple[Omission, ...]
     diagnostics: tuple[Diagnostic, ...]
 
 

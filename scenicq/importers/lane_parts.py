@@ -10,11 +10,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-__all__ = ["Beside", "LanePart", "cut_lanes"]
+__all__ = ["AdjacentLane", "LanePart", "cut_lanes"]
 
 
 @dataclass(frozen=True, slots=True)
-class Beside:
+class AdjacentLane:
     """A lane beside a stretch of another.
 
     Attributes:
@@ -52,7 +52,7 @@ class LanePart:
     right: tuple[str, int] | None
 
 
-def cut_lanes(lengths: Mapping[str, float], beside: Mapping[str, Sequence[Beside]], least_m: float) -> Mapping[
+def cut_lanes(lengths: Mapping[str, float], beside: Mapping[str, Sequence[AdjacentLane]], least_m: float) -> Mapping[
     str, tuple[LanePart, ...]
 ]:  # fmt: skip
     """The parts of each lane, in order.
@@ -86,7 +86,7 @@ def cut_lanes(lengths: Mapping[str, float], beside: Mapping[str, Sequence[Beside
     }
 
 
-def _back(name: str, share: float, known: Mapping[str, Sequence[Beside]]) -> Iterator[tuple[str, float]]:
+def _back(name: str, share: float, known: Mapping[str, Sequence[AdjacentLane]]) -> Iterator[tuple[str, float]]:
     """Where a cut of a lane lies on those that name it as their neighbour."""
     for other in dict.fromkeys(each.lane for each in known[name]):
         for each in known[other]:
@@ -97,7 +97,7 @@ def _back(name: str, share: float, known: Mapping[str, Sequence[Beside]]) -> Ite
 
 
 def _part_beside(
-    known: Sequence[Beside], share: float, is_left: bool, cuts: Mapping[str, Sequence[float]]
+    known: Sequence[AdjacentLane], share: float, is_left: bool, cuts: Mapping[str, Sequence[float]]
 ) -> tuple[str, int] | None:
     each = next((each for each in known if each.is_left == is_left and each.start <= share <= each.end), None)
     if each is None:

@@ -21,7 +21,7 @@ from scenicq.importers.ego_choice import Moment, ego_facts, with_egos
 from scenicq.importers.fields import NO_MAP, InvalidError, Record
 from scenicq.importers.layouts import openlabel_files
 from scenicq.importers.openlabel_objects import FrameObjects, objects_of
-from scenicq.importers.openlabel_systems import Systems, first_vehicle
+from scenicq.importers.openlabel_systems import CoordinateSystems, first_vehicle
 from scenicq.importers.recording_checks import tell_order
 from scenicq.importers.report import Report
 from scenicq.importers.specification import load_specification
@@ -168,7 +168,7 @@ def _read_frames(content: Record, file: str, prefix: str, classes: ClassNames, r
                 raise InvalidError("its key is not a number")
             frame = fields.record(frames[key], "it")
             properties = fields.optional_record(frame, "frame_properties")
-            at_frame = Systems(systems, fields.optional_record(properties, "transforms"))
+            at_frame = CoordinateSystems(systems, fields.optional_record(properties, "transforms"))
             report.count_unread("frames/*/frame_properties/transforms/* of no coordinate system", len(at_frame.unknown))
             boxes = FrameObjects(at_frame, classes, report, where)
             members = objects_of(content, frame, int(key), boxes)

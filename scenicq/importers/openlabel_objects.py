@@ -11,7 +11,7 @@ from scenicq.importers import fields
 from scenicq.importers.base import ClassNames
 from scenicq.importers.fields import InvalidError, Record
 from scenicq.importers.motion import pose_of_euler_angles, pose_of_quaternion
-from scenicq.importers.openlabel_systems import Systems
+from scenicq.importers.openlabel_systems import CoordinateSystems
 from scenicq.importers.recording_checks import radians
 from scenicq.importers.report import Report
 from scenicq.store.labels import LabelObject, OutOfPlane
@@ -34,7 +34,7 @@ class FrameObjects:
         where: The frame, for messages.
     """
 
-    systems: Systems
+    systems: CoordinateSystems
     classes: ClassNames
     report: Report
     where: str
@@ -137,7 +137,7 @@ def _is_finite(value: str | float | bool) -> bool:
     return isinstance(value, str | bool) or abs(value) < math.inf
 
 
-def _box(cuboid: Record, system: str | None, systems: Systems, report: Report) -> LabelObject:
+def _box(cuboid: Record, system: str | None, systems: CoordinateSystems, report: Report) -> LabelObject:
     count = len(fields.items(cuboid, "val"))
     values = fields.vector(cuboid, "val", 10 if count == 10 else 9)
     at = (values[0], values[1], values[2])

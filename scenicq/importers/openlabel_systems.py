@@ -13,14 +13,14 @@ from scenicq.importers import fields
 from scenicq.importers.fields import InvalidError, Record
 from scenicq.importers.motion import RigidTransform, pose_of_matrix, pose_of_quaternion, pose_of_rotations
 
-__all__ = ["Systems", "first_vehicle"]
+__all__ = ["CoordinateSystems", "first_vehicle"]
 
 _IDENTITY = RigidTransform((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
 _SEQUENCE = "ZYX"
 """The axes of Euler angles where none are named, each about the turned body."""
 
 
-class Systems:
+class CoordinateSystems:
     """The coordinate systems of a frame.
 
     Attributes:

@@ -14,7 +14,7 @@ from msgspec import structs
 
 from scenicq.errors import DataError, Diagnostic
 from scenicq.importers.folders import readable
-from scenicq.store.manifest import LeftOut
+from scenicq.store.manifest import Omission
 from scenicq.store.segment import SourceProblem
 
 __all__ = ["MOST_MESSAGES", "Report"]
@@ -126,10 +126,10 @@ class Report:
         return tuple(self._problems)
 
     @property
-    def counts(self) -> tuple[LeftOut, ...]:
+    def counts(self) -> tuple[Omission, ...]:
         """How often each problem occurred, sorted."""
         return tuple(
-            LeftOut(what, code, count, name, kept) for (kept, what, code, name), count in sorted(self._counts.items())
+            Omission(what, code, count, name, kept) for (kept, what, code, name), count in sorted(self._counts.items())
         )
 
     @property

@@ -24,7 +24,7 @@ from scenicq.garbage import pause_collector
 from scenicq.importers.base import LabelChecker, RecordingEntry, RecordingReader
 from scenicq.importers.recording_checks import tell_recording
 from scenicq.importers.report import MOST_MESSAGES, Report
-from scenicq.processes import Lost, Workers, default_processes
+from scenicq.processes import LostTask, Workers, default_processes
 from scenicq.store.schema import SCHEMA_VERSION, SEGMENT_TABLES, ArrowTable
 from scenicq.store.segment import MapIndexes, Segment, SegmentWriter, SourceRecording
 
@@ -203,7 +203,7 @@ def _write_apart(world: World, jobs: Sequence[Job], many: int, on_recording: OnR
 
     with workers:
         for job, segment in workers.run(jobs, told):
-            if isinstance(segment, Lost):
+            if isinstance(segment, LostTask):
                 message = (
                     f"{segment.tries} processes that wrote the recordings from `{job.shares[0].name}` on were killed, "
                     "perhaps for want of memory"

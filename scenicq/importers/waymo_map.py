@@ -17,7 +17,7 @@ from shapely.geometry import LineString, Polygon
 from scenicq.geometry.features import MapFeature, ProblemSink
 from scenicq.importers.fields import InvalidError
 from scenicq.importers.lane_graph import BoundedLane, Points, lane_features, lengths_along, sound_area
-from scenicq.importers.lane_parts import Beside, cut_lanes
+from scenicq.importers.lane_parts import AdjacentLane, cut_lanes
 from scenicq.importers.protobuf import Message, Value, integers, parse, to_signed
 from scenicq.importers.report import Report
 from scenicq.importers.specification import load_specification
@@ -102,7 +102,7 @@ def _cut(
 
     beside = {
         name: [
-            Beside(
+            AdjacentLane(
                 each.lane, each.is_left, *stretch(name, each.start, each.end),
                 *stretch(each.lane, each.its_start, each.its_end),
             )

@@ -12,7 +12,7 @@ from scenicq.errors import Source
 from scenicq.geometry.angles import normalize, rotate
 from scenicq.match.verdict import Match, NoMatch, Unknown, Verdict
 from scenicq.query.execution.recorded_columns import show_cell
-from scenicq.query.execution.results import Recorded
+from scenicq.query.execution.results import CarriedValue
 from scenicq.query.execution.variable_texts import variable_texts
 from scenicq.query.explain.bands import shorten
 from scenicq.report.camera_pictures import SpaceBox, camera_image, space_box
@@ -26,14 +26,14 @@ from scenicq.report.templates import markup
 if TYPE_CHECKING:
     from markupsafe import Markup
 
-__all__ = ["badge", "frame_facts", "frame_page", "when"]
+__all__ = ["badge", "format_time", "frame_facts", "frame_page"]
 
 _FIRST_US, _LAST_US = 946_684_800_000_000, 4_102_444_800_000_000
 """Start of the years 2000 and 2100: what lies outside is no date."""
 _PLACE = re.compile(r":(\d+):(\d+)(#\d+)?$")
 
 
-def when(timestamp_us: int) -> str:
+def format_time(timestamp_us: int) -> str:
     """A timestamp as date and time (UTC), or as seconds where it is that of a clock without a date."""
     if not _FIRST_US <= timestamp_us < _LAST_US:
         return f"{timestamp_us / 1e6:.2f} s"
@@ -121,7 +121,7 @@ def _boxes(shot: Shot) -> Iterator[SpaceBox]:
 
 
 def frame_facts(
-    shot: Shot, sensors: Sequence[Sensor], texts: Mapping[str, str], recorded: Mapping[str, Recorded] | None = None
+    shot: Shot, sensors: Sequence[Sensor], texts: Mapping[str, str], recorded: Mapping[str, CarriedValue] | None = None
 ) -> Markup:  # fmt: skip
     """All facts about a frame.
 
@@ -142,7 +142,7 @@ def frame_facts(
         if each.thumbnail is not None
     ]
     return markup(
-        "frames", "facts", label=shot.label, time=when(shot.label.timestamp_us), causes=_causes(shot),
+        "frames", "facts", label=shot.label, time=format_time(shot.label.timestamp_us), causes=_causes(shot),
         roles=list(_roles(shot)), witness=witness, margins=margins, cameras=cameras,
         recorded=[(name, show_cell(each.values[0]), ", ".join(each.lacking)) for name, each in recorded.items()],
         files=[each for each in sensors if each.thumbnail is None],

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from scenicq.query.execution.interval_frames import frames_of, verdict_at
 from scenicq.query.execution.recorded_columns import show_cell
-from scenicq.query.execution.results import ModeRecord, Recorded, RecordedCell, Result
+from scenicq.query.execution.results import CarriedValue, ModeRecord, RecordedCell, Result
 from scenicq.query.execution.run import Query
 from scenicq.query.explain.bands import Band, bands_of, conditions_over
 from scenicq.query.explain.interval_explanation import locate_interval
@@ -48,10 +48,11 @@ def interval_runs(query: Query, results: Iterable[Result], numbers: dict[str, tu
         yield FrameRun(result.recording, frames, number, count, _timeline(query, result))
 
 
-def _at_sample(recorded: Mapping[str, Recorded], place: int) -> Mapping[str, Recorded]:
+def _at_sample(recorded: Mapping[str, CarriedValue], place: int) -> Mapping[str, CarriedValue]:
     """The recorded values at a sample, and those of the whole interval."""
     return {
-        name: Recorded((each.values[place],), series=False) if each.series else each for name, each in recorded.items()
+        name: CarriedValue((each.values[place],), series=False) if each.series else each
+        for name, each in recorded.items()
     }
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.forest.nodes import ArithmeticOp
-from scenicq.geometry.cell_guards import Guard, Nearer, Off, Segments, Within
+from scenicq.geometry.cell_guards import Guard, NearestSegment, OutsidePolygon, Segments, Within
 from scenicq.geometry.cells import convex_parts, joined_boxes
 from scenicq.geometry.fields import VectorField
 from scenicq.geometry.shapes import Bounds, Shape, polygonal_part
@@ -76,9 +76,9 @@ def _misses(polygon: NDArray[np.float64], box: Bounds) -> bool:
 
 def _guard(guard: Guard, point: TermVector) -> Formula:
     match guard:
-        case Nearer():
+        case NearestSegment():
             return compare("<=", _least(point, guard.own), _least(point, guard.rivals))
-        case Off():
+        case OutsidePolygon():
             return negation(_inside(point, guard.area))
         case Within():
             return compare("<=", _least(point, guard.own), guard.reach**2)

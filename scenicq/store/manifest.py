@@ -20,9 +20,9 @@ __all__ = [
     "MANIFEST",
     "SEGMENTS",
     "Counts",
-    "LeftOut",
     "Manifest",
     "MapGroup",
+    "Omission",
     "Part",
     "Provenance",
     "Whole",
@@ -78,7 +78,7 @@ class MapGroup(Struct, frozen=True):
     maps: tuple[str, ...]
 
 
-class LeftOut(Struct, frozen=True):
+class Omission(Struct, frozen=True):
     """Something that the dataset lacks, or has otherwise than the source.
 
     Attributes:
@@ -148,7 +148,7 @@ class Manifest(Struct, frozen=True, kw_only=True, tag_field="format", tag=_FORMA
     by_map: dict[str, Counts]
     by_recording: dict[str, Counts]
     map_groups: tuple[MapGroup, ...] = ()
-    left_out: tuple[LeftOut, ...] = ()
+    left_out: tuple[Omission, ...] = ()
     provenance: Provenance = Provenance()
 
     def __post_init__(self) -> None:

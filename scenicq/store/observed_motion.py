@@ -13,14 +13,14 @@ from scenicq.store.motion import LONGEST_GAP_US
 if TYPE_CHECKING:
     import duckdb
 
-__all__ = ["Gaps", "Known", "LabelIntervals", "ObservedMotion", "observed_motion"]
+__all__ = ["Gaps", "LabelIntervals", "ObservedMotion", "QuantityCoverage", "observed_motion"]
 
 _OWNERS = MappingProxyType({"ego": ("labels", "ego_"), "objects": ("objects", "")})
 """The table and the beginning of the columns of the ego and of label objects."""
 
 
 @dataclass(frozen=True, slots=True)
-class Known:
+class QuantityCoverage:
     """How many egos or label objects have a quantity, and from where.
 
     Attributes:
@@ -72,7 +72,7 @@ class ObservedMotion:
         without_track: Label objects that nothing identifies in other labels.
     """
 
-    known: Mapping[str, Known]
+    known: Mapping[str, QuantityCoverage]
     steps: LabelIntervals | None
     gaps: Gaps
     without_track: int
@@ -85,7 +85,7 @@ def observed_motion(dataset: Dataset) -> ObservedMotion:
         DataError: A file has changed.
     """
     with dataset.blamed(), dataset.connect() as connection:
-        known: dict[str, Known] = {}
+        known: dict[str, QuantityCoverage] = {}
         for owner, (table, prefix) in _OWNERS.items():
             total, velocity, derived, acceleration, yaw_rate = _numbers(
                 connection,
@@ -94,9 +94,9 @@ def observed_motion(dataset: Dataset) -> ObservedMotion:
                 f"count({prefix}acceleration), count({prefix}yaw_rate) FROM {table}",
             )
             if total:
-                known[f"velocity of {owner}"] = Known(velocity - derived, derived, total - velocity)
-                known[f"acceleration of {owner}"] = Known(0, acceleration, total - acceleration)
-                known[f"angularSpeed of {owner}"] = Known(0, yaw_rate, total - yaw_rate)
+                known[f"velocity of {owner}"] = QuantityCoverage(velocity - derived, derived, total - velocity)
+                known[f"acceleration of {owner}"] = QuantityCoverage(0, acceleration, total - acceleration)
+                known[f"angularSpeed of {owner}"] = QuantityCoverage(0, yaw_rate, total - yaw_rate)
         shortest, median, longest, gaps = _numbers(
             connection,
             "coalesce(min(step), 0), coalesce(quantile_disc(step, 0.5), 0), coalesce(max(step), 0), "

@@ -22,7 +22,7 @@ from typing import IO
 from scenicq.errors import DataError, Diagnostic
 from scenicq.store.manifest import FOLDERS, check_path, find_links, is_dataset
 from scenicq.store.read_lock import nobody_reads
-from scenicq.store.targets import Spare, sync_folder
+from scenicq.store.targets import ReserveFile, sync_folder
 
 try:
     import fcntl
@@ -45,7 +45,7 @@ class Partial:
         self.folder = self.target.with_name(f".{self.target.name}.partial")
         self._kept: list[Path] = []
         self._lock: IO[bytes] | None = None
-        self._spare: Spare | None = None
+        self._spare: ReserveFile | None = None
 
     def open(self) -> None:
         """Make the folder, or take over one that a killed process left, and lock it.
@@ -56,7 +56,7 @@ class Partial:
         """
         if self.folder.is_symlink():
             raise _link_error(self.target, self.folder)
-        self._spare = Spare()
+        self._spare = ReserveFile()
         try:
             while self._lock is None:
                 self.folder.mkdir(exist_ok=True)

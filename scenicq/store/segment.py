@@ -54,7 +54,7 @@ class SourceProblem(Struct, frozen=True):
     """A problem of the source, as the importer's report told it.
 
     Attributes:
-        what, code, name, kept: As in `LeftOut`.
+        what, code, name, kept: As in `Omission`.
         message, hints: The diagnostic's.
     """
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from scenicq.errors import DataError, Diagnostic
-from scenicq.processes import Lost, Workers, limit_memory
+from scenicq.processes import LostTask, Workers, limit_memory
 from scenicq.store.dataset import DatasetReference
 
 __all__ = ["check_apart"]
@@ -22,7 +22,7 @@ def check_apart(dataset: DatasetReference) -> None:
     """
     with Workers(1, _start) as workers:
         for _, answer in workers.run([dataset], tries=1):
-            if isinstance(answer, Lost):
+            if isinstance(answer, LostTask):
                 message = f"{dataset.address}: the process that reads it dies, or needs more than {_MEMORY >> 30} GiB"
                 raise DataError(Diagnostic("dataset-invalid", message))
 

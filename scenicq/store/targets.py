@@ -25,7 +25,7 @@ except ImportError:
 from scenicq.errors import DataError, Diagnostic
 from scenicq.store.remote_path import AnyPath, RemotePath
 
-__all__ = ["Spare", "WriteTarget", "sync_folder", "target_of"]
+__all__ = ["ReserveFile", "WriteTarget", "sync_folder", "target_of"]
 
 _STAGE = "scenicq-"
 """How the temporary folders begin in which lies what is to be sent."""
@@ -143,7 +143,7 @@ class _Renamed:
         beside = self.path.with_name(f".{self.path.name}.tmp")
         if beside.is_symlink():
             beside.unlink()
-        with _Renamed(beside).sole_writer(), Spare() as spare:
+        with _Renamed(beside).sole_writer(), ReserveFile() as spare:
             try:
                 _empty(beside)  # of what a process has left that was killed
                 yield beside
@@ -291,7 +291,7 @@ def _locked(handle: int) -> bool:
     return True
 
 
-class Spare:
+class ReserveFile:
     """A file kept open in reserve: closing it lets a folder be listed where no more files may be opened.
 
     Raises:
@@ -302,7 +302,7 @@ class Spare:
         """Open it."""
         self._handle: int | None = os.open(os.devnull, os.O_RDONLY)
 
-    def __enter__(self) -> Spare:
+    def __enter__(self) -> ReserveFile:
         """The file."""
         return self
 

@@ -19,7 +19,7 @@ from scenicq.store.atomic_files import write_whole
 from scenicq.store.columns import RecordingColumns, columns_of
 from scenicq.store.frame_index import frame_hashes, index_rows, repeated_rows
 from scenicq.store.labels import Recording
-from scenicq.store.manifest import MANIFEST, Counts, LeftOut, Manifest, MapGroup, Provenance
+from scenicq.store.manifest import MANIFEST, Counts, Manifest, MapGroup, Omission, Provenance
 from scenicq.store.parquet import TableWriter
 from scenicq.store.partial import Partial, check_target
 from scenicq.store.schema import SCHEMAS, SEGMENT_TABLES, ArrowTable
@@ -187,7 +187,7 @@ class DatasetWriter:
         *,
         name: str,
         importer: str = "",
-        left_out: Iterable[LeftOut] = (),
+        left_out: Iterable[Omission] = (),
         provenance: Provenance | None = None,
     ) -> Manifest:
         """Write the maps, the index and the manifest, and give the dataset its name.

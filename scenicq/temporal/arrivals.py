@@ -33,7 +33,7 @@ from scenicq.store.labels import Label
 from scenicq.store.track_block import TrackBlock
 from scenicq.temporal.samples import BoundSamples
 from scenicq.temporal.starts import StartSearch
-from scenicq.temporal.stretches import StartTable, TracksSeen
+from scenicq.temporal.stretches import StartTable, TrackSpans
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
 __all__ = ["Arrivals", "LabelOf"]
@@ -213,7 +213,7 @@ class Arrivals:
         if not len(of):
             return kept
         tracks = np.unique(np.concatenate((bindings.ravel(), *(lives.track[each] for each in chosen))))
-        seen = TracksSeen(block, tracks, gap_s)
+        seen = TrackSpans(block, tracks, gap_s)
         newest = chosen[scene.first - len(indices) : scene.end - len(indices)]
         low = np.maximum.reduce([first_label[of] + 1, *(lives.start[each] for each in newest)])
         high = np.minimum.reduce([lives.last[each] for each in newest])

@@ -18,7 +18,16 @@ from scenicq.budget import look
 from scenicq.forest.among import LabelElements, among_column, concatenate, take_rows
 from scenicq.forest.clear_columns import QuickColumns, quick_form
 from scenicq.forest.column_domain import ColumnDomain, first_direction
-from scenicq.forest.columns import DEFINED, UNDEFINED, Coded, Column, arrays_of, column_of, constant_column, truth_of
+from scenicq.forest.columns import (
+    DEFINED,
+    UNDEFINED,
+    CodedValues,
+    Column,
+    arrays_of,
+    column_of,
+    constant_column,
+    truth_of,
+)
 from scenicq.forest.columns import UNKNOWN as UNOBSERVED
 from scenicq.forest.condition import expand
 from scenicq.forest.course_ends import has_ends
@@ -44,7 +53,7 @@ from scenicq.forest.unobserved import certain_and_possible, is_only_observed
 from scenicq.forest.walk import children, is_leaf, leaves, postorder
 from scenicq.limits import LIMITS
 from scenicq.temporal.grouping import group_equal
-from scenicq.temporal.samples import FIXED, BoundSamples, Observed, is_moving
+from scenicq.temporal.samples import FIXED, BoundSamples, RoleSamples, is_moving
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
 __all__ = ["AtomColumns", "UnclearVariable", "reads_start"]
@@ -100,7 +109,7 @@ class AtomColumns:
     """
 
     scenario: Scenario
-    samples: Observed
+    samples: RoleSamples
     assignment: Mapping[Identity, Value] = field(default_factory=dict["Identity", "Value"])
     start: NDArray[np.int64] | None = None
     given: Mapping[int, Column] = field(default_factory=dict["int", "Column"])
@@ -245,7 +254,7 @@ class AtomColumns:
         if column is None or column.status[sample] != DEFINED:
             return None
         match column.data:
-            case Coded(which, options):
+            case CodedValues(which, options):
                 return options[int(which[sample])]
             case (x, y):
                 return float(x[sample]), float(y[sample])
@@ -436,8 +445,8 @@ def _as_at(samples: NDArray[np.int64], column: Column) -> Column:
     """What was observed, at some samples."""
     data, status = column.data, column.status[samples]
     match data:
-        case Coded():
-            return Column(Coded(data.which[samples], data.options), status)
+        case CodedValues():
+            return Column(CodedValues(data.which[samples], data.options), status)
         case (x, y):
             return Column((x[samples], y[samples]), status)
         case np.ndarray():

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scenicq.forest.temporal import Atom
 from scenicq.temporal.first_exits import next_at
 from scenicq.temporal.hidden_conditions import HiddenConditions
-from scenicq.temporal.required import Required
+from scenicq.temporal.required import RequiredAtoms
 from scenicq.temporal.run_machine import RunMachine
 from scenicq.temporal.run_steps import times_out
 from scenicq.temporal.stretches import Stretches
@@ -57,7 +57,7 @@ class PossibleValues:
         """
         m = len(stretches.starts)
         found = cls(np.tile(hidden.low, (m, 1)), np.tile(hidden.high, (m, 1)))
-        required = Required.of(machine.dynamics)
+        required = RequiredAtoms.of(machine.dynamics)
         first, last = _ends(machine, required, stretches, atom, hidden)
         # a program that says when it ends has not ended where the samples are over
         found.high[first > stretches.ends()] = -np.inf
@@ -82,7 +82,7 @@ class PossibleValues:
 
 
 def _ends(
-    machine: RunMachine, required: Required, stretches: Stretches, atom: Callable[[Atom], Truth],
+    machine: RunMachine, required: RequiredAtoms, stretches: Stretches, atom: Callable[[Atom], Truth],
     hidden: HiddenConditions,
 ) -> tuple[Places, Places]:  # fmt: skip
     """The first place at which each run may end, behind the last one if there is none, and the last one."""

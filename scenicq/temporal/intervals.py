@@ -44,7 +44,7 @@ from scenicq.temporal.selection import choose_intervals
 from scenicq.temporal.stretches import StartTable, Stretches, stretches_of
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
-__all__ = ["IntervalMatcher", "IntervalVerdict", "Reported"]
+__all__ = ["BindingOutcome", "IntervalMatcher", "IntervalVerdict"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +76,7 @@ class IntervalVerdict:
 
 
 @dataclass(frozen=True, slots=True)
-class Reported:
+class BindingOutcome:
     """What became of the bindings of a block.
 
     Attributes:
@@ -161,7 +161,7 @@ class IntervalMatcher:
     def intervals(
         self, table: StartTable, remember: Callable[[int], StartLabel], *, every: bool = True,
         label: LabelOf | None = None,
-    ) -> Reported:  # fmt: skip
+    ) -> BindingOutcome:  # fmt: skip
         """What became of each binding: the intervals to report, or else the one that came furthest.
 
         Args:
@@ -194,20 +194,20 @@ class IntervalMatcher:
                 for some, runs in self._followed(program, stretches, own, remembered):
                     parts.append(runs.renumbered(which[some.numbers], some.labels))
         if not parts:
-            return Reported([])
+            return BindingOutcome([])
         look()
         found = Runs.joined(parts)
         found = replace(found, truth=np.minimum(found.truth, np.where(table.sure[found.owner], TRUE, UNKNOWN)))
         return self._reported(found, table, order, bindings, every=every)
 
-    def _unknown(self, table: StartTable, reason: str) -> Reported:
+    def _unknown(self, table: StartTable, reason: str) -> BindingOutcome:
         """That nothing is known of any start."""
         labels = np.unique(table.labels)
         recordings = table.block.recording_of[labels]
         firsts = np.array([first for first, _ in table.block.runs], dtype=np.int64)[recordings]
         rows = zip((labels - firsts).tolist(), recordings.tolist(), strict=True)
         found = [IntervalVerdict(at, at, int(UNKNOWN), (), recording, reason=reason) for at, recording in rows]
-        return Reported(found, len(table))
+        return BindingOutcome(found, len(table))
 
     def _followed(
         self, program: _Program, stretches: Stretches, table: StartTable, remember: Callable[[int], StartLabel]
@@ -242,7 +242,7 @@ class IntervalMatcher:
 
     def _reported(
         self, found: Runs, table: StartTable, order: NDArray[np.int64], bindings: NDArray[np.int64], *, every: bool
-    ) -> Reported:
+    ) -> BindingOutcome:
         """What is reported of the runs of all bindings.
 
         Args:
@@ -283,7 +283,7 @@ class IntervalMatcher:
         else:
             others.update(zip(best.broken.tolist(), best.cut_off.tolist(), strict=True))
         told.sort(key=lambda each: (each.recording, each.start, each.end, each.binding))
-        return Reported(told, count, others)
+        return BindingOutcome(told, count, others)
 
     def _verdicts(self, runs: Runs, table: StartTable, order: NDArray[np.int64]) -> list[IntervalVerdict]:
         """Runs, one by one; arguments as of `_reported`."""

@@ -34,7 +34,7 @@ from scenicq.store.track_block import TrackBlock, in_order
 from scenicq.temporal.atoms import AtomColumns, reads_start
 from scenicq.temporal.first_exits import next_at
 from scenicq.temporal.hidden import necessary_condition
-from scenicq.temporal.required import Required
+from scenicq.temporal.required import RequiredAtoms
 from scenicq.temporal.samples import MOVING, BoundSamples
 from scenicq.temporal.starts import RoleCandidates, narrow_candidates
 from scenicq.temporal.truth import FALSE, Truth
@@ -69,7 +69,7 @@ class NecessaryConditions:
         dynamics = self.scenario.dynamics
         if dynamics is None:
             return
-        required = Required.of(dynamics)
+        required = RequiredAtoms.of(dynamics)
         self.within_s = required.within_s
         some: list[tuple[Atom, ...]] = [(atom,) for atom in required.later]
         if required.ends and self.within_s is None:

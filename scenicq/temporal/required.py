@@ -15,11 +15,11 @@ from scenicq.forest.temporal import (
     Until,
 )
 
-__all__ = ["Required"]
+__all__ = ["RequiredAtoms"]
 
 
 @dataclass(frozen=True, slots=True)
-class Required:
+class RequiredAtoms:
     """Atoms that runs which match need; there may be more that they need.
 
     Attributes:
@@ -37,7 +37,7 @@ class Required:
     within_s: float | None
 
     @classmethod
-    def of(cls, dynamics: Dynamics) -> Required:
+    def of(cls, dynamics: Dynamics) -> RequiredAtoms:
         """Read them off a program."""
         when: dict[str, list[Atom]] = {"now": [], "always": [], "later": []}
         stack: list[tuple[Formula, str]] = [(each.formula, "now") for each in dynamics.requirements]

@@ -21,7 +21,7 @@ from scenicq.temporal.grouping import distinct, groups, values_of
 from scenicq.temporal.hidden_conditions import HiddenConditions
 from scenicq.temporal.run_machine import RunMachine
 from scenicq.temporal.run_notes import Notes
-from scenicq.temporal.run_steps import Ahead, RunSteps
+from scenicq.temporal.run_steps import RunPositions, RunSteps
 from scenicq.temporal.runs import Runs
 from scenicq.temporal.stretches import Timeline
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
@@ -95,7 +95,7 @@ def _together(steps: RunSteps) -> Runs:
             never = np.full(len(at), n + 1)
             none = np.empty((len(at), 0))
             last = last_at[at]
-            ahead = Ahead(np.full(len(at), situation), at, never, last, none, none)
+            ahead = RunPositions(np.full(len(at), situation), at, never, last, none, none)
             step = steps.step(situation, ahead, steps.exit(situation, ahead))
             notes.append(step.notes)
             after.append((step.ahead.situation, step.ahead.at))
@@ -128,7 +128,7 @@ def _apart(steps: RunSteps, possible: tuple[Numbers, Numbers] | None) -> Runs:
     owner, ahead = np.arange(len(steps.which)), steps.first(*within)
     notes = Notes.nothing(len(owner))
     stops = steps.exits(ahead)
-    over: list[tuple[NDArray[np.int64], Notes, Ahead]] = []
+    over: list[tuple[NDArray[np.int64], Notes, RunPositions]] = []
     while len(ahead):
         look()
         # the pieces of a run go on together, so that those that stand alike again can be joined
@@ -136,7 +136,7 @@ def _apart(steps: RunSteps, possible: tuple[Numbers, Numbers] | None) -> Runs:
         np.minimum.at(next_stop, owner, stops)
         place = next_stop[owner]
         ready = stops == place
-        parts: list[tuple[NDArray[np.int64], Notes, Ahead]] = []
+        parts: list[tuple[NDArray[np.int64], Notes, RunPositions]] = []
         for situation, chosen in groups(ahead.situation[ready]):
             mine = np.flatnonzero(ready)[chosen]
             step = steps.step(situation, ahead.some(mine), stops[mine], owner[mine])
@@ -152,7 +152,7 @@ def _apart(steps: RunSteps, possible: tuple[Numbers, Numbers] | None) -> Runs:
             parts.append((owner[rest], notes.some(rest).then(seen), waiting))
         owner = np.concatenate([each[0] for each in parts])
         notes = Notes.joined([each[1] for each in parts])
-        ahead = Ahead.joined([each[2] for each in parts])
+        ahead = RunPositions.joined([each[2] for each in parts])
         ended = ahead.situation < 0
         if possible is not None:
             # a run that has not ended and is lost is no match
@@ -177,7 +177,7 @@ def _apart(steps: RunSteps, possible: tuple[Numbers, Numbers] | None) -> Runs:
     of = np.concatenate([each[0] for each in over])
     order = np.argsort(of, kind="stable")
     of, notes = of[order], Notes.joined([each[1] for each in over]).some(order)
-    runs, ended = _runs_of(steps, notes, of), Ahead.joined([each[2] for each in over]).some(order)
+    runs, ended = _runs_of(steps, notes, of), RunPositions.joined([each[2] for each in over]).some(order)
     return replace(runs, owner=steps.which[of], low=ended.low, high=ended.high)
 
 
@@ -227,8 +227,8 @@ def _closed(steps: RunSteps, notes: Notes, of: NDArray[np.int64]) -> Runs:
 
 
 def _merged(
-    owner: NDArray[np.int64], notes: Notes, ahead: Ahead, *, chooses: bool
-) -> tuple[NDArray[np.int64], Notes, Ahead]:
+    owner: NDArray[np.int64], notes: Notes, ahead: RunPositions, *, chooses: bool
+) -> tuple[NDArray[np.int64], Notes, RunPositions]:
     """Pieces with those joined that touch, are of one run, stand in one situation and were alike before.
 
     Those of a run are all before the same place.

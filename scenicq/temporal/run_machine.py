@@ -17,12 +17,11 @@ from scenicq.budget import Exhausted
 from scenicq.errors import Span
 from scenicq.forest.temporal import (
     Activity,
-    Arm,
     Atom,
     Begin,
+    BranchOnTimer,
     CheckSample,
     Choose,
-    Due,
     Dynamics,
     End,
     Formula,
@@ -32,6 +31,7 @@ from scenicq.forest.temporal import (
     Leave,
     PutBehavior,
     Reject,
+    StartTimer,
     Stop,
     Terminate,
     Test,
@@ -234,7 +234,7 @@ class RunMachine:
         ]
         self._behaviors = [number for number, each in enumerate(dynamics.processes) if each.object is not None]
         self._literals = dict(enumerate(literals_of(dynamics.conditions)))
-        self.timed = any(isinstance(step, Arm) for step in steps)
+        self.timed = any(isinstance(step, StartTimer) for step in steps)
         self.chooses = any(isinstance(step, Choose) for step in steps)
         self._rests = tuple(map(self._progression.add, formulas))
         self.begin()
@@ -463,11 +463,11 @@ class RunMachine:
                     at = step.then if now.holds(step.condition.number) else step.otherwise
                 case Goto():
                     at = step.then
-                case Arm():
+                case StartTimer():
                     due = now.here + 1 if now.later is None else now.later(step.after_s)
                     timers[step.timer] = max(due, timers.get(step.timer, 0)) if step.extends else due
                     at = step.then
-                case Due():
+                case BranchOnTimer():
                     at = step.then if timers[step.timer] <= now.here else step.otherwise
                 case Choose():
                     if (number, at) not in now.chosen:

@@ -27,7 +27,7 @@ from scenicq.temporal.runs import SLACK_S, later_sample
 from scenicq.temporal.stretches import Timeline
 from scenicq.temporal.truth import FALSE, TRUE, Truth
 
-__all__ = ["Ahead", "LaneStep", "RunSteps", "times_out"]
+__all__ = ["LaneStep", "RunPositions", "RunSteps", "times_out"]
 
 Places = NDArray[np.int64]
 Numbers = NDArray[np.float64]
@@ -36,7 +36,7 @@ _MOST_COLUMNS = 64
 
 
 @dataclass(slots=True)
-class Ahead:
+class RunPositions:
     """Lanes: where they are, and how far they may go.
 
     Attributes:
@@ -58,14 +58,16 @@ class Ahead:
         """The number of lanes."""
         return len(self.at)
 
-    def some(self, which: NDArray[np.int64] | NDArray[np.bool_]) -> Ahead:
+    def some(self, which: NDArray[np.int64] | NDArray[np.bool_]) -> RunPositions:
         """Some of them."""
-        return Ahead(*(getattr(self, name)[which] for name in self.__slots__))
+        return RunPositions(*(getattr(self, name)[which] for name in self.__slots__))
 
     @staticmethod
-    def joined(parts: list[Ahead]) -> Ahead:
+    def joined(parts: list[RunPositions]) -> RunPositions:
         """Some lanes, then others."""
-        return Ahead(*(np.concatenate([getattr(part, name) for part in parts]) for name in Ahead.__slots__))
+        return RunPositions(
+            *(np.concatenate([getattr(part, name) for part in parts]) for name in RunPositions.__slots__)
+        )
 
 
 @dataclass(slots=True)
@@ -80,7 +82,7 @@ class LaneStep:
 
     of: NDArray[np.int64]
     notes: Notes
-    ahead: Ahead
+    ahead: RunPositions
 
 
 @dataclass(eq=False)
@@ -125,7 +127,7 @@ class RunSteps:
 
     # --- one step
 
-    def first(self, low: Numbers | None = None, high: Numbers | None = None) -> Ahead:
+    def first(self, low: Numbers | None = None, high: Numbers | None = None) -> RunPositions:
         """The lanes as they begin.
 
         Args:
@@ -136,16 +138,16 @@ class RunSteps:
         if low is None or high is None:
             ends = (np.empty(0),) * 2 if self.hidden is None else (self.hidden.low, self.hidden.high)
             low, high = (np.tile(each, (m, 1)) for each in ends)
-        return Ahead(np.zeros(m, np.int64), self.starts.copy(), self.due, self.last, low, high)
+        return RunPositions(np.zeros(m, np.int64), self.starts.copy(), self.due, self.last, low, high)
 
-    def exits(self, ahead: Ahead) -> Places:
+    def exits(self, ahead: RunPositions) -> Places:
         """The next place of each lane that may lead elsewhere, or lies behind the end."""
         found = np.zeros(len(ahead), np.int64)
         for situation, mine in groups(ahead.situation):
             found[mine] = self.exit(situation, ahead.some(mine))
         return found
 
-    def exit(self, number: int, ahead: Ahead) -> Places:
+    def exit(self, number: int, ahead: RunPositions) -> Places:
         """The next place of lanes in one situation that may lead elsewhere, or lies behind the end."""
         if self.machine.timed:
             return ahead.at
@@ -204,8 +206,8 @@ class RunSteps:
         """The value of each atom at a place, given the values of some at several places of which it is one."""
         return self.rows[int(self.code[place])] | {number: int(each[which]) for number, each in told.items()}
 
-    def _split(self, reads: list[int], ahead: Ahead, there: Places) -> tuple[
-        NDArray[np.int64], Ahead, Places, dict[int, NDArray[np.bool_]]
+    def _split(self, reads: list[int], ahead: RunPositions, there: Places) -> tuple[
+        NDArray[np.int64], RunPositions, Places, dict[int, NDArray[np.bool_]]
     ]:  # fmt: skip
         """Lanes cut where they read a cut within them, with the sides that they are on."""
         of = np.arange(len(ahead))
@@ -219,7 +221,7 @@ class RunSteps:
                 upper = ahead.some(within)
                 upper.low[:, variable] = at[within]
                 ahead.high[within, variable] = np.nextafter(at[within], -np.inf)
-                ahead = Ahead.joined([ahead, upper])
+                ahead = RunPositions.joined([ahead, upper])
                 of, there = np.concatenate((of, of[within])), np.concatenate((there, there[within]))
         sides = {
             cut: ahead.low[:, self.hidden.cuts[cut].variable] >= self._cut(cut, ahead, there)
@@ -227,13 +229,13 @@ class RunSteps:
         }  # fmt: skip
         return of, ahead, there, sides
 
-    def _cut(self, number: int, ahead: Ahead, there: Places) -> Numbers:
+    def _cut(self, number: int, ahead: RunPositions, there: Places) -> Numbers:
         """A cut at places; behind the last one of a lane there is none."""
         assert self.hidden is not None
         at = self.hidden.cuts[number].at
         return np.where(there > ahead.last, np.inf, at[np.minimum(there, len(at) - 1)])
 
-    def step(self, number: int, lanes: Ahead, there: Places, owner: NDArray[np.int64] | None = None) -> LaneStep:
+    def step(self, number: int, lanes: RunPositions, there: Places, owner: NDArray[np.int64] | None = None) -> LaneStep:
         """Lanes in one situation to the next place that leads elsewhere, and beyond it.
 
         Args:

@@ -21,7 +21,7 @@ from scenicq.store.reader import LAST
 from scenicq.store.track_block import TrackBlock
 from scenicq.store.tracks import RecordingTracks, TrackKey
 
-__all__ = ["FIXED", "MOVING", "WITH_COLUMNS", "Binding", "BoundSamples", "Observed", "Samples", "is_moving"]
+__all__ = ["FIXED", "MOVING", "WITH_COLUMNS", "Binding", "BoundSamples", "RoleSamples", "Samples", "is_moving"]
 
 MOVING = WHO | {"position", "heading", "velocity", "speed", "angularSpeed", "acceleration", COURSE, GOING, LAST_LANE}
 """Properties that change from sample to sample: where they are not observed, nothing is known of them."""
@@ -51,7 +51,7 @@ Binding = Mapping[int, TrackKey]
 Numbers = NDArray[np.float64]
 
 
-class Observed(Protocol):
+class RoleSamples(Protocol):
     """Some samples, with the label object of each role."""
 
     def __len__(self) -> int:
@@ -93,7 +93,7 @@ class BoundSamples:
         return self.size
 
     def observed(self, index: int, name: str) -> tuple[Numbers, ...] | list[Value] | None:
-        """See `Observed`."""
+        """See `RoleSamples`."""
         mine = self.members[index]
         if name in WHO:
             who = (self.block.id_ranks() if name == RANK else self.block.tracks(np.arange(self.block.size)))[mine]
@@ -112,7 +112,7 @@ class BoundSamples:
         return _observed(name, lambda column: self.block.numbers(column)[mine], said)
 
     def courses(self, index: int, rules: LaneCourse) -> list[Value]:
-        """See `Observed`."""
+        """See `RoleSamples`."""
         return [*self.block.courses(self.members[index], rules.network, rules.gap_s)]
 
     def seen(self, ego: int, index: int, name: str) -> tuple[Numbers, ...]:
@@ -215,7 +215,7 @@ class Samples:
         return self.end - self.first
 
     def observed(self, index: int, name: str) -> tuple[Numbers, ...] | list[Value] | None:
-        """See `Observed`."""
+        """See `RoleSamples`."""
         track = self.binding[index]
         if name == CLOCK:
             return (self.tracks.seconds[self.first : self.end],)
@@ -226,7 +226,7 @@ class Samples:
         return _observed(name, lambda column: self.tracks.column(track, column)[self.first : self.end], said)
 
     def courses(self, index: int, rules: LaneCourse) -> list[Value]:
-        """See `Observed`."""
+        """See `RoleSamples`."""
         track = self.binding[index]
         return [self.tracks.course(track, sample, rules.network, rules.gap_s) for sample in range(self.first, self.end)]
 
@@ -234,7 +234,7 @@ class Samples:
 def _observed(
     name: str, column: Callable[[str], Numbers], said: Callable[[], Sequence[Value]]
 ) -> tuple[Numbers, ...] | list[Value] | None:
-    """The values of a property; arguments as `Observed.observed`.
+    """The values of a property; arguments as `RoleSamples.observed`.
 
     Args:
         name: Name of the property.

@@ -16,7 +16,7 @@ from scenicq.store.classes import Granularity
 from scenicq.store.track_block import TrackBlock
 from scenicq.temporal.samples import BoundSamples
 
-__all__ = ["StartTable", "Stretches", "Timeline", "TracksSeen", "stretches_of"]
+__all__ = ["StartTable", "Stretches", "Timeline", "TrackSpans", "stretches_of"]
 
 Members = NDArray[np.int64]
 _AT_ONCE = 400_000
@@ -155,7 +155,7 @@ def stretches_of(table: StartTable, gap_s: float, *, apart: bool, classes: Granu
         return
     block, labels = table.block, table.labels
     tracks = {index: block.tracks(mine) for index, mine in table.members.items()}
-    seen = TracksSeen(block, np.unique(np.concatenate([*tracks.values()])), gap_s)
+    seen = TrackSpans(block, np.unique(np.concatenate([*tracks.values()])), gap_s)
     # who comes later is there at another label
     lives = {index: seen.life_ends(tracks[index], block.label_of[mine]) for index, mine in table.members.items()}
     ends = np.minimum.reduce(list(lives.values()))
@@ -187,7 +187,7 @@ def stretches_of(table: StartTable, gap_s: float, *, apart: bool, classes: Granu
         first = last
 
 
-class TracksSeen:
+class TrackSpans:
     """Where some tracks are seen: a row for each, of the samples from its first to its last."""
 
     def __init__(self, block: TrackBlock, wanted: Members, gap_s: float) -> None:

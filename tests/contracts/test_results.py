@@ -19,7 +19,7 @@ from scenicq.query.execution.recorded_columns import RecordedColumn, columns_of_
 from scenicq.query.execution.records import FrameRecord, SeriesRecord, decode_record, json_text, read_record, record
 from scenicq.query.execution.result_files import read_records
 from scenicq.query.execution.result_tables import result_schema, roles_of
-from scenicq.query.execution.results import IntervalSpan, LogDensity, ModeRecord, ProgramPlace, Recorded, Result
+from scenicq.query.execution.results import CarriedValue, IntervalSpan, LogDensity, ModeRecord, ProgramPlace, Result
 from scenicq_cli.formats import make_writer
 
 texts = st.text(st.characters(codec="utf-8"), max_size=8)
@@ -39,12 +39,12 @@ densities = st.builds(LogDensity, st.none() | finite, log_weight=st.none() | fin
 cells = st.sampled_from([finite, st.booleans(), texts, st.tuples(finite, finite)])
 
 
-def recorded_of(values: list[object], reason: str, series: bool) -> Recorded:
+def recorded_of(values: list[object], reason: str, series: bool) -> CarriedValue:
     missing = values.count(None)
-    return Recorded(tuple(values if series else values[:1]), series, {reason: missing} if missing else {})
+    return CarriedValue(tuple(values if series else values[:1]), series, {reason: missing} if missing else {})
 
 
-def recordings_of(kind: st.SearchStrategy[object]) -> st.SearchStrategy[Recorded]:
+def recordings_of(kind: st.SearchStrategy[object]) -> st.SearchStrategy[CarriedValue]:
     return st.builds(recorded_of, st.lists(st.none() | kind, min_size=1, max_size=4), names, st.booleans())
 
 
@@ -173,9 +173,9 @@ def test_a_result_is_made_again(result):
 
 def test_a_series_has_its_ends_and_what_lies_between():
     values = (3.0, None, -1.0, 7.5)
-    recorded = {"gap": Recorded(values, series=True, lacking={"not observed": 1})}
+    recorded = {"gap": CarriedValue(values, series=True, lacking={"not observed": 1})}
     span = IntervalSpan("f3", 3, 4, open_ended=False)
     told = record(Result("f", "r", 1, Match({}, {}), interval=span, recorded=recorded))
     assert told.recorded["gap"] == SeriesRecord(3.0, 7.5, -1.0, 7.5, (3.0 - 1.0 + 7.5) / 3, list(values))
-    of_frame = record(Result("f", "r", 1, Match({}, {}), recorded={"gap": Recorded((3.0,), series=True)}))
+    of_frame = record(Result("f", "r", 1, Match({}, {}), recorded={"gap": CarriedValue((3.0,), series=True)}))
     assert of_frame.recorded == {"gap": 3.0}

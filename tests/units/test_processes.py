@@ -12,7 +12,7 @@ import pytest
 
 import scenicq.processes
 from scenicq.errors import DataError
-from scenicq.processes import Lost, Workers
+from scenicq.processes import LostTask, Workers
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals")
 
@@ -113,8 +113,8 @@ def test_tasks_are_taken_when_there_is_room():
 def test_a_task_that_kills_is_lost_and_no_other(tmp_path):
     with Workers(2, deadly, (tmp_path,)) as workers:
         found = dict(workers.run(range(8)))
-    assert found[3] == Lost(3)
-    assert [task for task, answer in found.items() if isinstance(answer, Lost)] == [3]
+    assert found[3] == LostTask(3)
+    assert [task for task, answer in found.items() if isinstance(answer, LostTask)] == [3]
     assert [answer[1] for task, answer in found.items() if task != 3] == [0, 1, 2, 4, 5, 6, 7]
 
 

@@ -25,10 +25,10 @@ from scenicq.match.options import MatchOptions
 from scenicq.match.problem.map_lookups import XY, MapLookups
 from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied
 
-__all__ = ["FAILS", "ClosedForm", "Evaluated", "each_position"]
+__all__ = ["FAILS", "ClosedForm", "GroupEvaluation", "each_position"]
 
 
-class Evaluated(NamedTuple):
+class GroupEvaluation(NamedTuple):
     """A group under one assignment of label objects, or under many.
 
     Attributes:
@@ -42,9 +42,9 @@ class Evaluated(NamedTuple):
     values: Mapping[Identity, Value | FloatColumn | list[Value]]
 
 
-FAILS = Evaluated(False, True, {})
-_UNCLEAR = Evaluated(False, False, {})
-Evaluate: TypeAlias = Callable[[Lookup, MatchOptions, MapLookups], Evaluated]
+FAILS = GroupEvaluation(False, True, {})
+_UNCLEAR = GroupEvaluation(False, False, {})
+Evaluate: TypeAlias = Callable[[Lookup, MatchOptions, MapLookups], GroupEvaluation]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,7 +94,7 @@ class ClosedForm:
                 pass
         return None
 
-    def evaluate_one(self, get: Lookup, options: MatchOptions, lookups: MapLookups) -> Evaluated:
+    def evaluate_one(self, get: Lookup, options: MatchOptions, lookups: MapLookups) -> GroupEvaluation:
         """As `decide`, without words; None where an expression has no value."""
         try:
             return self.evaluate(get, options, lookups)
@@ -103,7 +103,7 @@ class ClosedForm:
 
     def evaluate_many(
         self, row: Callable[[int], Lookup], columns: Columns, options: MatchOptions, lookups: MapLookups
-    ) -> Evaluated:
+    ) -> GroupEvaluation:
         """Evaluate many assignments, each as `evaluate_one` does.
 
         Args:
@@ -118,13 +118,13 @@ class ClosedForm:
         except CannotEvaluate:
             return self._one_by_one([row(number) for number in range(columns.size)], options, lookups)
 
-    def _one_by_one(self, rows: Sequence[Lookup], options: MatchOptions, lookups: MapLookups) -> Evaluated:
+    def _one_by_one(self, rows: Sequence[Lookup], options: MatchOptions, lookups: MapLookups) -> GroupEvaluation:
         """Where columns do not do; nothing is said of those whose witness has other variables than the first one's."""
         outcomes = [self.decide(get, options, lookups) for get in rows]
         witnesses = [outcome.values if isinstance(outcome, Satisfied) else None for outcome in outcomes]
         known = next((values.keys() for values in witnesses if values is not None), frozenset[Identity]())
         kept = [values if values is not None and values.keys() == known else None for values in witnesses]
-        return Evaluated(
+        return GroupEvaluation(
             [values is not None for values in kept],
             [isinstance(outcome, Refuted) for outcome in outcomes],
             {identity: [math.nan if values is None else values[identity] for values in kept] for identity in known},

@@ -21,7 +21,7 @@ from scenicq.forest.interpret import Steps, interpret, steps_of
 from scenicq.forest.kinds import kind_of
 from scenicq.forest.nodes import Constant, Feature, Identity, Index, Node, PointIn, Select, Value
 from scenicq.forest.walk import children, leaves, postorder
-from scenicq.match.decide.closed_form import ClosedForm, Evaluated
+from scenicq.match.decide.closed_form import ClosedForm, GroupEvaluation
 from scenicq.match.decide.closed_numbers import heading, number, text
 from scenicq.match.decide.closed_positions import known_vector, offset, point_in
 from scenicq.match.decide.compiled_expressions import VECTORS, CompiledExpressions, compile_condition, element_field
@@ -78,18 +78,18 @@ def _condition_form(item: Condition, chosen: Mapping[Identity, float]) -> Closed
     }
     steps = steps_of(item.expression, known=known)
 
-    def evaluate(get: Lookup, options: MatchOptions, lookups: MapLookups) -> Evaluated:
+    def evaluate(get: Lookup, options: MatchOptions, lookups: MapLookups) -> GroupEvaluation:
         if isinstance(get, Columns):
             return _evaluate_columns(item.expression, steps, known, get, chosen)
         found = holds(get)
-        return Evaluated(found, not found, {})
+        return GroupEvaluation(found, not found, {})
 
     return ClosedForm(item, evaluate, detail=lambda get, lookups: "does not hold")
 
 
 def _evaluate_columns(
     root: Node, steps: Steps, known: Mapping[int, Column], get: Columns, chosen: Mapping[Identity, float]
-) -> Evaluated:  # fmt: skip
+) -> GroupEvaluation:  # fmt: skip
     """Evaluate a condition for many labels; it neither holds nor fails where it is undefined or rounding may decide."""
 
     def observed(node: Feature) -> Column:
@@ -98,7 +98,7 @@ def _evaluate_columns(
     domain = ClearColumns(observed, lambda leaf, _: constant_column(chosen[leaf.identity]), first_direction)
     data, status = interpret(steps, domain, known)[id(root)]
     held, told = (np.broadcast_to(each, get.size) for each in (truth_of(data), np.equal(status, DEFINED)))
-    return Evaluated((held & told).tolist(), (~held & told).tolist(), {})
+    return GroupEvaluation((held & told).tolist(), (~held & told).tolist(), {})
 
 
 def _find_ranks(group: Group) -> list[tuple[Index, Select]]:
@@ -136,7 +136,7 @@ def _without_overlaps(forms: Sequence[ClosedForm], ranks: Sequence[tuple[Index, 
                 found = found & (first == other)
         return found
 
-    def evaluate(get: Lookup, options: MatchOptions, lookups: MapLookups) -> Evaluated:
+    def evaluate(get: Lookup, options: MatchOptions, lookups: MapLookups) -> GroupEvaluation:
         known = alone(get)
         values: dict[Identity, Value | FloatColumn | list[Value]] = {}
         holds, fails = known, np.zeros(1, np.bool_)
@@ -147,8 +147,8 @@ def _without_overlaps(forms: Sequence[ClosedForm], ranks: Sequence[tuple[Index, 
         values |= {index.identity: 0.0 for index, _ in ranks}
         if isinstance(get, Columns):
             truths = [np.broadcast_to(each, get.size).tolist() for each in (holds, fails)]
-            return Evaluated(truths[0], truths[1], values)
-        return Evaluated(bool(holds[0]), bool(fails[0]), values)
+            return GroupEvaluation(truths[0], truths[1], values)
+        return GroupEvaluation(bool(holds[0]), bool(fails[0]), values)
 
     asking = next((form for form in forms if form.index >= 0), forms[0])
     return ClosedForm(forms[0].constraint, evaluate, asking.field, asking.regions, asking.index, parts=tuple(forms))

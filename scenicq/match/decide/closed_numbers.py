@@ -16,7 +16,7 @@ from scenicq.forest.walk import postorder
 from scenicq.geometry.fields import VectorField
 from scenicq.geometry.road_direction import RoadDirection
 from scenicq.limits import LIMITS
-from scenicq.match.decide.closed_form import ClosedForm, Evaluated, each_position
+from scenicq.match.decide.closed_form import ClosedForm, GroupEvaluation, each_position
 from scenicq.match.decide.compiled_expressions import CompiledExpressions
 from scenicq.match.decide.range_forms import Columns, FloatColumn, Form, Lookup, Scalar, by_option, clip, spread
 from scenicq.match.options import MatchOptions
@@ -68,7 +68,7 @@ def number(item: Comparison, known: Mapping[Identity, float]) -> ClosedForm | No
     if not cases or any(case.form.fields for case in cases):
         return None
 
-    def evaluate(get: Lookup, options: MatchOptions, lookups: MapLookups) -> Evaluated:
+    def evaluate(get: Lookup, options: MatchOptions, lookups: MapLookups) -> GroupEvaluation:
         margin, seen = options.tolerance.of(index, name), get(index, name)
         many, fails = isinstance(get, Columns), True
         if (many and len(cases) > 1) or not isinstance(seen, float | np.ndarray):
@@ -79,9 +79,9 @@ def number(item: Comparison, known: Mapping[Identity, float]) -> ClosedForm | No
             off = abs(value - seen)
             holds, misses = off <= margin.sure, off > margin.reach + SLACK
             if many or holds:
-                return Evaluated(holds, misses, chosen | spread(form, value - known))
+                return GroupEvaluation(holds, misses, chosen | spread(form, value - known))
             fails = fails and misses
-        return Evaluated(False, fails, {})
+        return GroupEvaluation(False, fails, {})
 
     first = cases[0].form
 
@@ -111,14 +111,14 @@ def text(item: Comparison) -> ClosedForm | None:
         return None
     index, name = item.object, item.property
 
-    def evaluate(get: Lookup, options_: MatchOptions, lookups: MapLookups) -> Evaluated:
+    def evaluate(get: Lookup, options_: MatchOptions, lookups: MapLookups) -> GroupEvaluation:
         if isinstance(get, Columns):
             raise CannotEvaluate("what a closed form does not say")
         seen = get(index, name)
         for chosen, value in options:
             if value == seen:
-                return Evaluated(True, False, chosen)
-        return Evaluated(False, True, {})
+                return GroupEvaluation(True, False, chosen)
+        return GroupEvaluation(False, True, {})
 
     return ClosedForm(item, evaluate, detail=lambda get, _: unlike(name, options[0][1], get(index, name)))
 
@@ -145,7 +145,7 @@ def heading(item: Comparison, known: Mapping[Identity, float]) -> ClosedForm | N
     flow = along.field.value if along is not None and isinstance(along.field, Constant) else None
     where = cast(Feature, along.point).object if flow is not None and along is not None else -1
 
-    def evaluate(get: Lookup, options: MatchOptions, lookups: MapLookups) -> Evaluated:
+    def evaluate(get: Lookup, options: MatchOptions, lookups: MapLookups) -> GroupEvaluation:
         margin, seen = options.tolerance.of(index, "heading"), cast(float, get(index, "heading"))
         many, fails = isinstance(get, Columns), True
         if many and len(choices) > 1:
@@ -168,9 +168,9 @@ def heading(item: Comparison, known: Mapping[Identity, float]) -> ClosedForm | N
             holds, misses = beyond <= margin.sure, beyond > margin.reach + SLACK
             if many or holds:
                 values = spread(form, middle + clip(off, -half, half))
-                return Evaluated(holds, misses, chosen | values if chosen else values)
+                return GroupEvaluation(holds, misses, chosen | values if chosen else values)
             fails = fails and misses
-        return Evaluated(False, fails, {})
+        return GroupEvaluation(False, fails, {})
 
     def detail(get: Lookup, lookups: MapLookups) -> str:
         # what the cascade tries first is what it words

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from scenicq.forest.groups import Comparison
 from scenicq.forest.nodes import Identity, PointIn, Rotate, Value, VectorOf, VectorSum
-from scenicq.match.decide.closed_form import FAILS, ClosedForm, Evaluated, each_position
+from scenicq.match.decide.closed_form import FAILS, ClosedForm, GroupEvaluation, each_position
 from scenicq.match.decide.compiled_expressions import CompiledExpressions
 from scenicq.match.decide.range_forms import Columns, CompiledVector, FloatColumn, Lookup, Scalar, clip, cos_sin, spread
 from scenicq.match.decide.region_tests import region_test
@@ -39,7 +39,7 @@ def point_in(item: Comparison, node: PointIn, ego: int, chosen: Mapping[Identity
     if test is None:
         return None
 
-    def evaluate(get: Lookup, options: MatchOptions, lookups: MapLookups) -> Evaluated:
+    def evaluate(get: Lookup, options: MatchOptions, lookups: MapLookups) -> GroupEvaluation:
         position = get(index, "position")
         holds, fails = test.evaluate(get, position, lookups, options.tolerance.of(index, "position").reach + SLACK)
         places = each_position(position)
@@ -48,12 +48,12 @@ def point_in(item: Comparison, node: PointIn, ego: int, chosen: Mapping[Identity
             inside = [math.dist(place, centre) <= near for place, centre in zip(places, centres, strict=True)]
             holds = holds & (np.array(inside) if isinstance(get, Columns) else inside[0])
         if isinstance(get, Columns):
-            return Evaluated(
+            return GroupEvaluation(
                 cast(NDArray[np.bool_], holds).tolist(),
                 cast(NDArray[np.bool_], fails).tolist(),
                 {node.identity: cast("list[Value]", places)},
             )
-        return Evaluated(bool(holds), bool(fails), {node.identity: places[0]})
+        return GroupEvaluation(bool(holds), bool(fails), {node.identity: places[0]})
 
     return ClosedForm(item, evaluate, regions=test.regions, index=index)
 
@@ -65,9 +65,9 @@ def known_vector(item: Comparison) -> ClosedForm | None:
         return None
     index, name = item.object, item.property
 
-    def evaluate(get: Lookup, options: MatchOptions, lookups: MapLookups) -> Evaluated:
+    def evaluate(get: Lookup, options: MatchOptions, lookups: MapLookups) -> GroupEvaluation:
         (x, y), (px, py) = cast(XY, exact(get)), cast(XY, get(index, name))
-        return Evaluated(*_close(x - px, y - py, options.tolerance.of(index, name)), {})
+        return GroupEvaluation(*_close(x - px, y - py, options.tolerance.of(index, name)), {})
 
     def detail(get: Lookup, lookups: MapLookups) -> str:
         return unlike(name, cast(XY, exact(get)), cast(XY, get(index, name)))
@@ -145,7 +145,7 @@ def offset(item: Comparison) -> ClosedForm | None:
         return None
     index, name = item.object, item.property
 
-    def evaluate(get: Lookup, options: MatchOptions, lookups: MapLookups) -> Evaluated:
+    def evaluate(get: Lookup, options: MatchOptions, lookups: MapLookups) -> GroupEvaluation:
         px, py = cast(XY, get(index, name))
         margin = options.tolerance.of(index, name)
         turns: list[XY] = []
@@ -167,7 +167,7 @@ def offset(item: Comparison) -> ClosedForm | None:
             middle = a + (x.low + x.high) / 2 - px, b + (y.low + y.high) / 2 - py
             fails |= _apart(middle, ((x.high - x.low) / 2, (y.high - y.low) / 2), _composed(turns), margin)
         if holds is False:
-            return FAILS if fails is True else Evaluated(holds, fails, {})
-        return Evaluated(holds, fails, spread(x, u - a) | spread(y, v - b))
+            return FAILS if fails is True else GroupEvaluation(holds, fails, {})
+        return GroupEvaluation(holds, fails, spread(x, u - a) | spread(y, v - b))
 
     return ClosedForm(item, evaluate)

@@ -20,7 +20,7 @@ from scenicq.forest.groups import Condition, Group
 from scenicq.forest.interpret import interpret, steps_of
 from scenicq.forest.nodes import Constant, DirectionAt, Feature
 from scenicq.forest.walk import is_leaf, postorder
-from scenicq.match.decide.closed_form import ClosedForm, Evaluated
+from scenicq.match.decide.closed_form import ClosedForm, GroupEvaluation
 from scenicq.match.decide.range_forms import Columns, Lookup
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.map_lookups import MapLookups
@@ -43,7 +43,7 @@ def others_form_of(group: Group) -> ClosedForm | None:
     known = {id(node): constant_column(node.value) for node in nodes if isinstance(node, Constant)}
     steps = steps_of(item.expression, known=known)
 
-    def evaluate(get: Lookup, options: MatchOptions, lookups: MapLookups) -> Evaluated:
+    def evaluate(get: Lookup, options: MatchOptions, lookups: MapLookups) -> GroupEvaluation:
         if not isinstance(get, Columns):
             raise CannotEvaluate("others of a label alone")
         of_classes = cast("Callable[[Granularity], LabelElements]", get(*LABEL_OBJECTS))
@@ -60,6 +60,6 @@ def others_form_of(group: Group) -> ClosedForm | None:
         )
         data, status = interpret(steps, domain, known)[id(item.expression)]
         holds = np.broadcast_to(truth_of(data) & np.equal(status, DEFINED), get.size)
-        return Evaluated(holds.tolist(), [False] * get.size, {})
+        return GroupEvaluation(holds.tolist(), [False] * get.size, {})
 
     return ClosedForm(item, evaluate)

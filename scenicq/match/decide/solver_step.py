@@ -118,7 +118,7 @@ def _ask_once(items: Sequence[Sequence[Item]], options: MatchOptions, solver: So
     """Decide groups by one question; a witness that does not replay is repaired, refined, then given up."""
     flat = [item for group in items for item in group]
     blame = flat[0][0]
-    from scenicq.match.fields.field_solver import repaired  # noqa: PLC0415 - these take long to load
+    from scenicq.match.fields.field_solver import repair_solution  # noqa: PLC0415 - these take long to load
     from scenicq.smt.answer import NoAnswer, Sat, Unsat  # noqa: PLC0415
     from scenicq.smt.case_split import check_by_cases  # noqa: PLC0415
 
@@ -142,7 +142,7 @@ def _ask_once(items: Sequence[Sequence[Item]], options: MatchOptions, solver: So
                 values = encoding.values(answer.witness)
                 if replay(flat, values, options.tolerance, options.precision):
                     return Satisfied(values)
-                close = repaired(flat, values, options.tolerance)
+                close = repair_solution(flat, values, options.tolerance)
                 if close is not None:
                     return close
         precision /= _REFINED

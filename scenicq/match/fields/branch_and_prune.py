@@ -16,7 +16,7 @@ from scenicq.forest.walk import leaves
 from scenicq.limits import LIMITS, limit_exceeded
 from scenicq.match.fields.constraint_network import ConstraintNetwork
 from scenicq.match.fields.contractor import BoxSet
-from scenicq.match.fields.heading_propagation import branch, propagated
+from scenicq.match.fields.heading_propagation import branch, propagate
 from scenicq.match.fields.witness_search import QUICK, THOROUGH, find_witness
 from scenicq.match.problem.conditioned import Item, item_conjuncts
 from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
@@ -38,7 +38,7 @@ def branch_and_prune(items: Sequence[Item], tolerance: Tolerance) -> Outcome:
     first = items[0][0]
     network = ConstraintNetwork(list(chain.from_iterable(map(item_conjuncts, items))), tolerance)
     try:
-        start = propagated(BoxSet.start(network, {}))
+        start = propagate(BoxSet.start(network, {}))
         if not start.size:
             return Refuted(first)
         found = find_witness(start, THOROUGH) or _search(start)
@@ -74,7 +74,7 @@ def _boxes(start: BoxSet) -> Iterator[BoxSet]:
     while todo:
         look()
         for part in branch(todo.pop()):
-            left = propagated(part)
+            left = propagate(part)
             if left.size:
                 seen += left.size
                 if seen > LIMITS.pruned_boxes:

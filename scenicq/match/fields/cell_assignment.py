@@ -33,7 +33,7 @@ from scenicq.match.problem.evaluation import holds, replay
 from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
 from scenicq.match.tolerance import SLACK, Tolerance
 
-__all__ = ["MARGIN", "SAME", "HeadingAssignment", "assignment_of", "extent", "solved"]
+__all__ = ["MARGIN", "SAME", "HeadingAssignment", "assignment_of", "extent", "solve_cells"]
 
 MARGIN = 2e-6
 """Metres by which boxes are grown, so that rounding loses nothing."""
@@ -70,7 +70,7 @@ class HeadingAssignment:
     vague: list[Node]
 
 
-def solved(
+def solve_cells(
     way: HeadingAssignment, tolerance: Tolerance, known: Mapping[Identity, float] = MappingProxyType({})
 ) -> Outcome:
     """Whether a part has a solution in which the fields point as chosen.

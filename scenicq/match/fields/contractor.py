@@ -58,15 +58,15 @@ from scenicq.match.fields.interval_domain import (
     cone,
     divide,
     everything,
+    find_empty,
     lengths,
     negative,
-    nothing_left,
     rotate,
     subtract,
     times,
     turning,
     turns_near,
-    wrapped,
+    wrap_angles,
 )
 from scenicq.match.fields.interval_functions import PARTIAL, arguments_of, range_of
 from scenicq.match.fields.region_bounds import distance_between, places_of
@@ -192,7 +192,7 @@ class BoxSet:
     def _lost(self) -> NDArray[np.bool_]:
         lost = np.zeros(self.size, dtype=bool)
         for each in (*self.ranges.values(), *self._bounds.values()):
-            lost |= nothing_left(each)
+            lost |= find_empty(each)
         return lost
 
     # --- bounds
@@ -242,7 +242,7 @@ class BoxSet:
             case Coordinate():
                 return self._vector(node.vector)[node.axis]
             case Bearing():
-                return wrapped(angle_of(self._vector(node.vector)))
+                return wrap_angles(angle_of(self._vector(node.vector)))
             case Norm():
                 return lengths(self._vector(node.vector))
             case Distance():

@@ -18,17 +18,23 @@ from scenicq.forest.groups import Constraint
 from scenicq.forest.nodes import DiscreteRange, Identity, Index, Value
 from scenicq.forest.walk import leaves
 from scenicq.limits import LIMITS
-from scenicq.match.fields.cell_assignment import HeadingAssignment, assignment_of, solved
+from scenicq.match.fields.cell_assignment import HeadingAssignment, assignment_of, solve_cells
 from scenicq.match.fields.constraint_network import ConstraintNetwork
 from scenicq.match.fields.contractor import BoxSet
-from scenicq.match.fields.heading_propagation import DirectedCases, KnownCases, bisected, directed, propagated
-from scenicq.match.fields.shared_variable import find_shared_value, joined
+from scenicq.match.fields.heading_propagation import (
+    DirectedCases,
+    KnownCases,
+    bisect_cases,
+    propagate,
+    split_by_direction,
+)
+from scenicq.match.fields.shared_variable import find_shared_value, join_intervals
 from scenicq.match.fields.witness_search import THOROUGH, find_witness
 from scenicq.match.problem.conditioned import Item, condition_items
 from scenicq.match.problem.outcome import Outcome, Patience, Refuted, Satisfied, SearchSteps, Undecided, finish
 from scenicq.match.tolerance import Tolerance
 
-__all__ = ["repaired", "search_directions"]
+__all__ = ["repair_solution", "search_directions"]
 
 _MANY_CASES = 128
 """Cases of one part after which more draws look for a witness than before, and again after four times so many."""
@@ -114,13 +120,13 @@ def _alone(start: BoxSet, first: Constraint, tolerance: Tolerance) -> SearchStep
     todo: deque[HeadingAssignment] = deque()
     doubt, searched = Undecided(first, "nonlinear"), 0
     try:
-        for number, way in enumerate(_one_by_one(directed(start, _MANY_CASES))):
+        for number, way in enumerate(_one_by_one(split_by_direction(start, _MANY_CASES))):
             if way is None:
                 yield Patience.ALL if searched else Patience.LIKELY
                 found = _searched(start, searched)
                 searched += 1
             else:
-                found = solved(way, tolerance)
+                found = solve_cells(way, tolerance)
             if isinstance(found, Satisfied):
                 return found
             if number == LIMITS.field_ways:
@@ -147,7 +153,7 @@ def _halved(todo: deque[HeadingAssignment], first: Constraint, tolerance: Tolera
         if less is None:
             break
         for way in less:
-            found = solved(way, tolerance)
+            found = solve_cells(way, tolerance)
             if isinstance(found, Satisfied):
                 return found
             if isinstance(found, Undecided):
@@ -166,13 +172,13 @@ def _searched(start: BoxSet, seed: int = 0) -> Satisfied | None:
 def _divided(way: HeadingAssignment, shared: Identity | None) -> list[HeadingAssignment] | None:
     """What is left of a way in cells that cover too much over either half of the widest range that matters there."""
     try:
-        halves = [propagated(half) for half in bisected(way.case, leaves(*way.vague))]
+        halves = [propagate(half) for half in bisect_cases(way.case, leaves(*way.vague))]
     except Exhausted:
         return None
     return _ways([half for half in halves if half.size], shared)
 
 
-def repaired(items: Sequence[Item], near: Mapping[Identity, Value], tolerance: Tolerance) -> Satisfied | None:
+def repair_solution(items: Sequence[Item], near: Mapping[Identity, Value], tolerance: Tolerance) -> Satisfied | None:
     """A solution close to values that miss one by little, such as the far side of a border; None if none is found.
 
     Args:
@@ -193,7 +199,7 @@ def repaired(items: Sequence[Item], near: Mapping[Identity, Value], tolerance: T
 def _joined(found: Sequence[BoxSet], shared: Identity) -> list[FloatInterval]:
     """Where the shared number can be, intervals that meet as one."""
     ends = np.concatenate([cases.ranges[shared] for cases in found], axis=1).T.tolist()
-    return joined([(low, high) for low, high in ends])
+    return join_intervals([(low, high) for low, high in ends])
 
 
 def _within(found: Sequence[BoxSet], shared: Identity, limits: Sequence[FloatInterval]) -> list[BoxSet]:

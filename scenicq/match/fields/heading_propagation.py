@@ -26,7 +26,7 @@ from scenicq.limits import LIMITS, limit_exceeded
 from scenicq.match.fields.cell_assignment import MARGIN, SAME
 from scenicq.match.fields.contractor import BoxSet
 
-__all__ = ["DirectedCases", "KnownCases", "bisected", "branch", "directed", "propagated"]
+__all__ = ["DirectedCases", "KnownCases", "bisect_cases", "branch", "propagate", "split_by_direction"]
 
 _AT_ONCE = 256
 """Cases that are narrowed together: what one of them finds may make the others needless."""
@@ -42,7 +42,7 @@ _LONG = 1.0
 """Width of a range of numbers that is divided before directions are, where these are many."""
 
 
-def directed(start: BoxSet, soon: float = math.inf) -> Iterator[BoxSet]:
+def split_by_direction(start: BoxSet, soon: float = math.inf) -> Iterator[BoxSet]:
     """The cases in which every field has one direction and something is left, those found first at once.
 
     Args:
@@ -61,7 +61,7 @@ def directed(start: BoxSet, soon: float = math.inf) -> Iterator[BoxSet]:
         seen += cases.size
         if seen > LIMITS.heading_cases:
             raise limit_exceeded("heading_cases")
-        cases = propagated(cases)
+        cases = propagate(cases)
         if not cases.size:
             continue
         parts = _parted(cases)
@@ -72,11 +72,11 @@ def directed(start: BoxSet, soon: float = math.inf) -> Iterator[BoxSet]:
 
 
 class DirectedCases:
-    """What `directed` finds, looked for once, whoever goes through it and however often."""
+    """What `split_by_direction` finds, looked for once, whoever goes through it and however often."""
 
     def __init__(self, start: BoxSet, soon: float) -> None:
-        """Take what `directed` takes."""
-        self._more = directed(start, soon)
+        """Take what `split_by_direction` takes."""
+        self._more = split_by_direction(start, soon)
         self._found: list[BoxSet] = []
         self._error: Exhausted | None = None
 
@@ -111,7 +111,7 @@ KnownCases: TypeAlias = dict[tuple[object, ...], DirectedCases]
 """Cases that were looked for already, by what they are cases of."""
 
 
-def propagated(cases: BoxSet) -> BoxSet:
+def propagate(cases: BoxSet) -> BoxSet:
     """The cases of which something is left, narrowed until places and headings do not narrow each other any more."""
     for _ in range(LIMITS.heading_passes):
         cases = _placed(cases.narrowed())
@@ -125,7 +125,7 @@ def propagated(cases: BoxSet) -> BoxSet:
     return cases
 
 
-def bisected(cases: BoxSet, below: Sequence[Leaf]) -> list[BoxSet]:
+def bisect_cases(cases: BoxSet, below: Sequence[Leaf]) -> list[BoxSet]:
     """The cases with the widest range of a number, or of a coordinate of a point, halved.
 
     Args:
@@ -148,7 +148,7 @@ def branch(cases: BoxSet) -> Iterable[BoxSet]:
         Exhausted: They are too small for either.
     """
     parts = _parted(cases)
-    return bisected(cases, [*cases.network.leaves.values()]) if parts is None else parts
+    return bisect_cases(cases, [*cases.network.leaves.values()]) if parts is None else parts
 
 
 def _widest(cases: BoxSet, below: Sequence[Leaf]) -> tuple[float, Identity, int] | None:
@@ -227,7 +227,7 @@ def _parted(cases: BoxSet) -> Iterable[BoxSet] | None:
     sizes = {id(node): float(_extent(cases, node).max()) for node in vague}
     node = min(vague, key=lambda node: sizes[id(node)])  # where least of the map comes into question
     if sizes[id(node)] > _FAR:
-        return bisected(cases, leaves(node))
+        return bisect_cases(cases, leaves(node))
     owner, ranges = _pieces(cases, node)
     if len(owner) > 2 * cases.size:
         # over less of the way that random numbers allow there are fewer directions

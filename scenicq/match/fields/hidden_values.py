@@ -13,7 +13,16 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from scenicq.forest.columns import DEFINED, UNDEFINED, Array, Coded, Column, ColumnPlaces, common_status, value_reader
+from scenicq.forest.columns import (
+    DEFINED,
+    UNDEFINED,
+    Array,
+    CodedValues,
+    Column,
+    ColumnPlaces,
+    common_status,
+    value_reader,
+)
 from scenicq.forest.nodes import DiscreteRange, Index, Leaf, Normal, PointIn, Range, TruncatedNormal, Undefined, Value
 from scenicq.geometry.projection import nearest_points
 from scenicq.geometry.regions import Region
@@ -83,7 +92,7 @@ class HiddenValue:
         xy = np.full((places.count, 2), np.nan)
         near = (float(self.low[0, 0]), float(self.low[1, 0]), float(self.high[0, 0]), float(self.high[1, 0]))
         wanted = np.broadcast_to(place.T, xy.shape)
-        if isinstance(region.data, Coded):
+        if isinstance(region.data, CodedValues):
             which: NDArray[np.intp] = places.spread(region.data.which)[places.defined]
             options: list[int] = np.unique(which).tolist()
             for option in options:

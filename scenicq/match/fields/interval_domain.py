@@ -30,11 +30,11 @@ __all__ = [
     "cone",
     "divide",
     "everything",
+    "find_empty",
     "lengths",
     "loosen",
     "magnitude",
     "negative",
-    "nothing_left",
     "rotate",
     "step_out",
     "stretch",
@@ -42,7 +42,7 @@ __all__ = [
     "times",
     "turning",
     "turns_near",
-    "wrapped",
+    "wrap_angles",
 ]
 
 Enclosure: TypeAlias = NDArray[np.float64]
@@ -143,7 +143,7 @@ def common(a: Enclosure, b: Enclosure) -> Enclosure:
     return found
 
 
-def nothing_left(a: Enclosure) -> NDArray[np.bool_]:
+def find_empty(a: Enclosure) -> NDArray[np.bool_]:
     """In which cases an enclosure is empty, (n,)."""
     empty = a[..., 0, :] > a[..., 1, :]
     return np.logical_or.reduce(np.atleast_2d(empty), axis=0)
@@ -208,7 +208,7 @@ def cone(box: Enclosure, heading: Enclosure) -> Enclosure:
     return common(by_length, by_other)
 
 
-def wrapped(angles: Enclosure) -> Enclosure:
+def wrap_angles(angles: Enclosure) -> Enclosure:
     """Angles in [-pi, pi]; all of these where the ends are not of one turn."""
     middle = (angles[0] + angles[1]) / 2
     found = angles - math.tau * np.round(np.where(np.isfinite(middle), middle / math.tau, 0.0))

@@ -82,7 +82,7 @@ def range_of(op: ArithmeticOp, args: Sequence[Enclosure]) -> Enclosure:
         case ArithmeticOp.ATAN:
             return domain.loosen(np.arctan(first))
         case ArithmeticOp.ATAN2:
-            return domain.wrapped(domain.angle_of(np.stack([domain.negative(first), last])))
+            return domain.wrap_angles(domain.angle_of(np.stack([domain.negative(first), last])))
         case ArithmeticOp.EXP:
             return _exponential(first)
         case ArithmeticOp.LOG:
@@ -92,7 +92,7 @@ def range_of(op: ArithmeticOp, args: Sequence[Enclosure]) -> Enclosure:
         case ArithmeticOp.CEIL:
             return np.ceil(first)
         case ArithmeticOp.WRAP:
-            return domain.wrapped(first)
+            return domain.wrap_angles(first)
 
 
 def arguments_of(op: ArithmeticOp, own: Enclosure, args: Sequence[Enclosure]) -> list[Enclosure]:

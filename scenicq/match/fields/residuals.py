@@ -10,7 +10,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from scenicq.forest.columns import DEFINED, Column, Placed, distances, truth_of
+from scenicq.forest.columns import DEFINED, Column, PlacedRegions, distances, truth_of
 from scenicq.forest.groups import Comparison
 from scenicq.forest.nodes import Compare, CompareOp, Contains, Logic, LogicOp, Node, Select, Value
 from scenicq.geometry.angles import normalize_array
@@ -140,6 +140,6 @@ def _measure(node: Node, wanted: bool, known: Mapping[int, Column]) -> _Numbers:
             return np.abs(left.astype(float) - right.astype(float)) + _STRICT
     if isinstance(node, Contains) and wanted:
         region, point = known[id(node.region)].data, known[id(node.point)].data
-        if isinstance(region, Placed) and isinstance(point, tuple):
+        if isinstance(region, PlacedRegions) and isinstance(point, tuple):
             return cast(_Numbers, distances(region, *point)) + _STRICT
     return np.full(1, _BROKEN)

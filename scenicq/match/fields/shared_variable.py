@@ -13,12 +13,12 @@ from dataclasses import dataclass, replace
 from scenicq.forest.bounds import FloatInterval
 from scenicq.forest.nodes import Identity, Value
 from scenicq.limits import LIMITS
-from scenicq.match.fields.cell_assignment import HeadingAssignment, extent, solved
+from scenicq.match.fields.cell_assignment import HeadingAssignment, extent, solve_cells
 from scenicq.match.problem.evaluation import replay
 from scenicq.match.problem.outcome import Outcome, Refuted, Satisfied, Undecided
 from scenicq.match.tolerance import ROUNDING, SLACK, Tolerance
 
-__all__ = ["find_shared_value", "joined"]
+__all__ = ["find_shared_value", "join_intervals"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +81,7 @@ def find_shared_value(
     return Undecided(first, "nonlinear")
 
 
-def joined(ends: Sequence[FloatInterval]) -> list[FloatInterval]:
+def join_intervals(ends: Sequence[FloatInterval]) -> list[FloatInterval]:
     """Intervals in order, those that meet as one."""
     found: list[FloatInterval] = []
     for low, high in sorted(ends):
@@ -96,7 +96,7 @@ def _common(parts: Sequence[Sequence[_Stretch]]) -> list[FloatInterval]:
     """Where every part has a stretch."""
     common: list[FloatInterval] | None = None
     for stretches in parts:
-        own = joined([(stretch.low, stretch.high) for stretch in stretches])
+        own = join_intervals([(stretch.low, stretch.high) for stretch in stretches])
         if common is not None:
             pairs = [(max(a, c), min(b, d)) for a, b in common for c, d in own]
             own = [(min(low, high), max(low, high)) for low, high in pairs if low <= high + ROUNDING]
@@ -110,7 +110,7 @@ def _until_satisfied(
     """What comes of a value in each stretch, up to the first in which it is part of a solution."""
     found: list[Outcome] = []
     for stretch in stretches:
-        found.append(solved(stretch.way, tolerance, {shared: value}))
+        found.append(solve_cells(stretch.way, tolerance, {shared: value}))
         if isinstance(found[-1], Satisfied):
             break
     return found

@@ -25,7 +25,7 @@ from scenicq.forest.groups import Constraint
 from scenicq.forest.nodes import COURSE, GOING, LAST_LANE, RANK, WHO, Identity, LaneCourse, Leaf, Value
 from scenicq.forest.scenario import Scenario
 from scenicq.limits import LIMITS
-from scenicq.match.decide.closed_form import ClosedForm, Evaluated
+from scenicq.match.decide.closed_form import ClosedForm, GroupEvaluation
 from scenicq.match.decide.others_forms import others_form_of
 from scenicq.match.decide.range_forms import Columns, FloatColumn, Lookup
 from scenicq.match.options import MatchOptions
@@ -271,7 +271,7 @@ class _Batch:
                 form, _Batch(self.fit, [self.rows[number] for number in some], furthest), options, lookups
             )
 
-    def evaluate(self, form: ClosedForm, options: MatchOptions, lookups: MapLookups) -> Evaluated:
+    def evaluate(self, form: ClosedForm, options: MatchOptions, lookups: MapLookups) -> GroupEvaluation:
         """What a closed form says of the labels."""
         if self.columns is None:
             # not a method of this batch: a cycle would keep its labels until the collector comes

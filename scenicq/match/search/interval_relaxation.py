@@ -22,9 +22,9 @@ from scenicq.forest.intervals import IntervalDomain
 from scenicq.forest.nodes import Feature, Node, Rotate, Select, VectorSum
 from scenicq.match.tolerance import SLACK, Margin, Tolerance
 
-__all__ = ["Observed", "Relaxation", "within_margin"]
+__all__ = ["ObservedLookup", "Relaxation", "within_margin"]
 
-Observed = Callable[[int, str], FloatOrArray | tuple[FloatOrArray, FloatOrArray] | None]
+ObservedLookup = Callable[[int, str], FloatOrArray | tuple[FloatOrArray, FloatOrArray] | None]
 """What is observed of an object: numbers or a pair of them for all its candidates; None where it is no number."""
 
 
@@ -57,7 +57,7 @@ class Relaxation:
                 given[id(node)] = interpret((step,), domain, known)[id(node)]
         return cls(group, steps_of(*roots, known=given), given)
 
-    def possible(self, observed: Observed, tolerance: Tolerance) -> FloatOrArray:
+    def possible(self, observed: ObservedLookup, tolerance: Tolerance) -> FloatOrArray:
         """For which candidates of its roles the group may be satisfiable.
 
         Args:

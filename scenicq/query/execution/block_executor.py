@@ -11,8 +11,8 @@ import numpy as np
 
 from scenicq.limits import LIMITS
 from scenicq.match.verdict import Cause, Unknown
-from scenicq.processes import Lost, Work, Workers, default_processes
-from scenicq.query.execution.block_matcher import Decided, Decider, every_label
+from scenicq.processes import LostTask, Work, Workers, default_processes
+from scenicq.query.execution.block_matcher import BlockOutcome, Decider, every_label
 from scenicq.query.execution.results import Result
 from scenicq.query.prefilter.executor import Block, join_first
 from scenicq.store.dataset import Dataset
@@ -31,7 +31,7 @@ class BlockExecutor:
     """
 
     def __init__(
-        self, dataset: Dataset, jobs: int | None, decider: Decider, start: Callable[..., Work[Block, Decided]],
+        self, dataset: Dataset, jobs: int | None, decider: Decider, start: Callable[..., Work[Block, BlockOutcome]],
         setup: tuple[Any, ...],
     ) -> None:  # fmt: skip
         """Prepare; no process starts yet.
@@ -46,7 +46,7 @@ class BlockExecutor:
         self.jobs = default_processes() if jobs is None else jobs
         self._asked = jobs is not None
         self._dataset, self._decider = dataset, decider
-        self._workers: Workers[Block, Decided] = Workers(self.jobs, start, setup)
+        self._workers: Workers[Block, BlockOutcome] = Workers(self.jobs, start, setup)
         self._started = False
         self._open = ExitStack()
 
@@ -60,7 +60,7 @@ class BlockExecutor:
         """End all processes."""
         self._open.__exit__(*error)
 
-    def decide(self, blocks: Sequence[Block], told: Callable[[Any], None] | None = None) -> Iterator[Decided]:
+    def decide(self, blocks: Sequence[Block], told: Callable[[Any], None] | None = None) -> Iterator[BlockOutcome]:
         """Decide blocks; each is to be taken before the next is asked for.
 
         Args:
@@ -83,12 +83,12 @@ class BlockExecutor:
 
     def _elsewhere(
         self, blocks: Iterable[Block], told: Callable[[Any], None] | None = None, tries: int | None = None
-    ) -> Iterator[Decided]:
+    ) -> Iterator[BlockOutcome]:
         """Decide blocks side by side, a bounded number ahead."""
         for block, found in self._workers.run(blocks, told, tries=LIMITS.block_tries if tries is None else tries):
-            yield from self._halves(block) if isinstance(found, Lost) else (found,)
+            yield from self._halves(block) if isinstance(found, LostTask) else (found,)
 
-    def _halves(self, block: Block) -> Iterator[Decided]:
+    def _halves(self, block: Block) -> Iterator[BlockOutcome]:
         if block.divisible:
             for half in block.halves():
                 # a half is lost at once: only what is left to blame, a frame or recording, gets more chances
@@ -97,9 +97,11 @@ class BlockExecutor:
         if block.runs:
             from scenicq.query.execution.recording_matcher import lost_recording  # noqa: PLC0415 - takes long to load
 
-            yield Decided(np.full(block.end - block.first, -1, np.int16), [], [], lost_recording(self._dataset, block))
+            yield BlockOutcome(
+                np.full(block.end - block.first, -1, np.int16), [], [], lost_recording(self._dataset, block)
+            )
             return
         for label in every_label(self._dataset, block):
             lost = Unknown("crash", Cause("process", "every process that matched this frame died"))
             result = Result(label.frame, label.recording, label.timestamp_us, lost, label.sensors)
-            yield Decided(np.full(1, -1, np.int16), [[result]], [])
+            yield BlockOutcome(np.full(1, -1, np.int16), [[result]], [])

@@ -45,7 +45,7 @@ _FIRST_BATCH, _BATCH = 16, 2048
 """Labels whose places are looked up together: few until it is known what matters."""
 MAPS_KEPT = 8
 """Maps of which a process keeps what it needs to match: each is a few megabytes, and labels come map by map."""
-__all__ = ["MAPS_KEPT", "CompiledMap", "Decided", "Decider", "every_label", "has_timelines"]
+__all__ = ["MAPS_KEPT", "BlockOutcome", "CompiledMap", "Decider", "every_label", "has_timelines"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +97,7 @@ class CompiledMap:
 
 
 @dataclass(frozen=True, slots=True)
-class Decided:
+class BlockOutcome:
     """What became of a block.
 
     Attributes:
@@ -172,7 +172,7 @@ class Decider:
             self._solver = self._open.enter_context(LazySolver(self.solver))
         return self._connection
 
-    def decide(self, block: Block) -> Decided:
+    def decide(self, block: Block) -> BlockOutcome:
         """Decide a block; its results come while they are taken, before the next block.
 
         Raises:
@@ -201,20 +201,20 @@ class Decider:
                 return
             yield each
 
-    def _decide(self, block: Block) -> Decided:
+    def _decide(self, block: Block) -> BlockOutcome:
         connection, compiled = self.connection, self.plan_map(block.map)
         if block.runs:
             return self._recordings(compiled, block)
         if not compiled.plan.stages:
             labels = [Candidate(label, None) for label in every_label(self.dataset, block, motion=compiled.motion)]
-            return Decided(np.full(len(labels), -1, np.int16), self._matched(iter(labels)), [])
+            return BlockOutcome(np.full(len(labels), -1, np.int16), self._matched(iter(labels)), [])
         missed = run_prefilter(self.dataset, connection, compiled.plan, block)
         named = names(self.dataset, connection, block) if self.every else []
         if not (missed < 0).any():
-            return Decided(missed, [], named)
+            return BlockOutcome(missed, [], named)
         if compiled.plan.decision and not self.all_matches:
-            return Decided(missed, self._partly_decided(compiled), named)
-        return Decided(missed, self._matched(self._left(compiled)), named)
+            return BlockOutcome(missed, self._partly_decided(compiled), named)
+        return BlockOutcome(missed, self._matched(self._left(compiled)), named)
 
     def _partly_decided(self, compiled: CompiledMap) -> Iterator[list[Result]]:
         """The results of the frames that the prefilter has left, where SQL says that some surely match."""
@@ -239,7 +239,7 @@ class Decider:
             whole=whole,
         )
 
-    def _recordings(self, compiled: CompiledMap, block: Block) -> Decided:
+    def _recordings(self, compiled: CompiledMap, block: Block) -> BlockOutcome:
         """Decide a block of whole recordings over time."""
         # takes long to load
         from scenicq.query.execution.recording_matcher import DecidedRecordings, Survivors  # noqa: PLC0415
@@ -279,13 +279,13 @@ class Decider:
 
         left = Survivors(every[missed < 0], rows, plan.roles or (), read)
         if not len(left.labels):
-            return Decided(missed, [], [], DecidedRecordings.nothing(block))
+            return BlockOutcome(missed, [], [], DecidedRecordings.nothing(block))
         parts, found = block.by_map(), DecidedRecordings()
         objects = object_rows(self.dataset, connection, block) if len(parts) > 1 else {}
         for part in parts:
             mine = left.within(part, objects.get(part.map))
             found.add(self._on_map(part, mine) if len(mine.labels) else DecidedRecordings.nothing(part))
-        return Decided(missed, [], [], found)
+        return BlockOutcome(missed, [], [], found)
 
     def _on_map(self, block: Block, left: Survivors) -> DecidedRecordings:
         """Decide recordings of one map, some labels of which the prefilter has left."""

@@ -12,7 +12,7 @@ from collections.abc import Callable, Generator, Iterable
 from dataclasses import dataclass, replace
 
 from scenicq.errors import Source
-from scenicq.processes import Lost, Workers, default_processes
+from scenicq.processes import LostTask, Workers, default_processes
 from scenicq.query.execution.pieces import DatasetPiece, find_finished, gather, partitions, write_piece
 from scenicq.query.execution.program_files import SiblingFiles
 from scenicq.query.execution.question_notes import name_question
@@ -23,9 +23,9 @@ from scenicq.store.dataset import DatasetReference
 from scenicq.store.remote_path import AnyPath
 
 __all__ = [
-    "Asked",
     "Done",
     "Executor",
+    "PieceQuestion",
     "Progress",
     "Question",
     "local_executor",
@@ -83,7 +83,7 @@ class Question:
         return Query(self.dataset.open(), self.source, self.options, files=self.files)
 
 
-Asked = tuple[Question, DatasetPiece]
+PieceQuestion = tuple[Question, DatasetPiece]
 Progress = Callable[[int], None]
 """Called with the number of frames decided since the last call."""
 Executor = Callable[[Query, Iterable[DatasetPiece], Progress], Generator[tuple[DatasetPiece, Done]]]
@@ -122,10 +122,10 @@ def processes(count: int) -> Executor:
 
     def run(query: Query, pieces: Iterable[DatasetPiece], progress: Progress) -> Generator[tuple[DatasetPiece, Done]]:
         question = Question.of(query)
-        workers: Workers[Asked, Done] = Workers(count, _start)
+        workers: Workers[PieceQuestion, Done] = Workers(count, _start)
         with workers:
             for (_, piece), answer in workers.run((question, piece) for piece in pieces):
-                done = run_frame_by_frame(query, piece) if isinstance(answer, Lost) else answer
+                done = run_frame_by_frame(query, piece) if isinstance(answer, LostTask) else answer
                 progress(piece.frames)
                 yield piece, done
 
@@ -202,10 +202,10 @@ def _put_together(
                 return
 
 
-def _start() -> Callable[[Asked, Callable[[object], None]], Done]:
+def _start() -> Callable[[PieceQuestion, Callable[[object], None]], Done]:
     known: dict[str, Query] = {}
 
-    def work(asked: Asked, _tell: Callable[[object], None]) -> Done:
+    def work(asked: PieceQuestion, _tell: Callable[[object], None]) -> Done:
         question, piece = asked
         if question.fingerprint not in known:
             known[question.fingerprint] = question.query()

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from scenicq.budget import DeadlineError
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown
-from scenicq.query.execution.block_matcher import Decided
+from scenicq.query.execution.block_matcher import BlockOutcome
 from scenicq.query.execution.results import Funnel, Result
 from scenicq.query.prefilter.plan import Plan
 
@@ -27,7 +27,7 @@ def until_deadline(found: Iterable[_Item], funnel: Funnel) -> Iterator[_Item]:
         funnel.cut = True
 
 
-def _excluded(plan: Plan, block: Decided, start: int, end: int) -> Iterator[Result]:
+def _excluded(plan: Plan, block: BlockOutcome, start: int, end: int) -> Iterator[Result]:
     """The frames between two candidates."""
     numbers: list[int] = block.missed[start:end].tolist()
     for (frame, recording, time), number in zip(block.names[start:end], numbers, strict=True):
@@ -46,7 +46,7 @@ def _count_excluded(plan: Plan, missed: NDArray[np.int16], funnel: Funnel, *, re
 
 
 def merge_frames(
-    plan: Plan, decided: Iterable[Decided], funnel: Funnel, progress: Callable[[int], None], *, every: bool,
+    plan: Plan, decided: Iterable[BlockOutcome], funnel: Funnel, progress: Callable[[int], None], *, every: bool,
     reasons: bool,
 ) -> Generator[Result]:  # fmt: skip
     """The results of blocks in their order, counted as far as they are taken.
@@ -91,7 +91,7 @@ def merge_frames(
 
 
 def merge_intervals(
-    plan: Plan, decided: Iterable[Decided], funnel: Funnel, progress: Callable[[int], None], *, every: bool,
+    plan: Plan, decided: Iterable[BlockOutcome], funnel: Funnel, progress: Callable[[int], None], *, every: bool,
     reasons: bool,
 ) -> Generator[Result]:  # fmt: skip
     """The intervals of blocks of whole recordings; arguments as of `merge_frames`."""

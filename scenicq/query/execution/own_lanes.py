@@ -16,7 +16,7 @@ from scenicq.geometry.network import Network
 from scenicq.geometry.occupancy import ElementAtPoint, Occupancy
 from scenicq.match.verdict import Match
 from scenicq.query.execution.members import Members, fill_by_recording
-from scenicq.query.execution.results import Result, Standing
+from scenicq.query.execution.results import ObjectLanes, Result
 from scenicq.store.dataset import Dataset
 from scenicq.store.labels import Label
 from scenicq.store.reader import LAST
@@ -75,7 +75,7 @@ class OwnLanes:
                 found[node.point.object] = _Asked(asked.lanes, along)
         return {owner.name: found[owner.index] for owner in self.scenario.objects if owner.index in found}
 
-    def of_label(self, label: Label, correspondence: Mapping[str, str]) -> dict[str, Standing]:
+    def of_label(self, label: Label, correspondence: Mapping[str, str]) -> dict[str, ObjectLanes]:
         """The lanes of the roles that play in a label.
 
         Args:
@@ -92,11 +92,11 @@ class OwnLanes:
             if each is not None
         }
 
-    def _standing(self, name: str, x: float, y: float, heading: float | None, last: float | None) -> Standing:
+    def _standing(self, name: str, x: float, y: float, heading: float | None, last: float | None) -> ObjectLanes:
         asked = self.asked[name]
         going = heading if asked.along and heading is not None else math.nan
         found = asked.lanes.owners_at((x, y), going, math.nan if last is None else last)
-        return Standing(tuple(lane for lane, own in found if own), tuple(lane for lane, own in found if not own))
+        return ObjectLanes(tuple(lane for lane, own in found if own), tuple(lane for lane, own in found if not own))
 
     def at_the_start(self, dataset: Dataset, results: Sequence[Result]) -> Iterator[Result]:
         """Put the lanes at their first frames into intervals that match.
@@ -126,7 +126,7 @@ class OwnLanes:
                 yield replace(each, lanes=lanes)
 
 
-def show_standing(standing: Standing) -> str:
+def show_standing(standing: ObjectLanes) -> str:
     """In which lanes somebody stands, as text."""
     own = f"in {' or '.join(f'`{lane}`' for lane in standing.own)}" if standing.own else "in no lane"
     return f"{own}, lies in {', '.join(f'`{lane}`' for lane in standing.others)}, too" if standing.others else own

@@ -32,7 +32,7 @@ from scenicq.store.dataset import Dataset
 from scenicq.store.remote_path import AnyPath
 from scenicq.store.targets import target_of
 
-__all__ = ["DatasetPiece", "Gathered", "find_finished", "fingerprint", "gather", "partitions", "write_piece"]
+__all__ = ["DatasetPiece", "GatheredPieces", "find_finished", "fingerprint", "gather", "partitions", "write_piece"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,7 +153,7 @@ _LATER = ("unrecorded",)
 
 
 @dataclass(frozen=True, slots=True)
-class Gathered:
+class GatheredPieces:
     """The pieces of one question, put together.
 
     Attributes:
@@ -207,7 +207,7 @@ def _counted(value: int | dict[str, int]) -> Any:
     return Counter(value) if isinstance(value, dict) else value
 
 
-def gather(folder: AnyPath, question: str | None = None, *, only: int | None = None) -> Gathered:
+def gather(folder: AnyPath, question: str | None = None, *, only: int | None = None) -> GatheredPieces:
     """Put the pieces in a folder together.
 
     Args:
@@ -244,4 +244,4 @@ def gather(folder: AnyPath, question: str | None = None, *, only: int | None = N
         total.add(piece.funnel)
         summaries.append(piece.summary)
     known = [each for each in summaries if each is not None]
-    return Gathered(chosen, tuple(found), total, join_summaries(known) if len(known) == len(summaries) else None)
+    return GatheredPieces(chosen, tuple(found), total, join_summaries(known) if len(known) == len(summaries) else None)

@@ -28,7 +28,7 @@ from scenicq.match.problem.conditioned import options_of
 from scenicq.match.verdict import Match
 from scenicq.query.execution.members import Members, fill_by_recording
 from scenicq.query.execution.result_samples import ResultSamples, ResultStretches, assignment_of
-from scenicq.query.execution.results import Recorded, RecordedCell, Result
+from scenicq.query.execution.results import CarriedValue, RecordedCell, Result
 from scenicq.store.dataset import Dataset
 from scenicq.temporal.atoms import AtomColumns, UnclearVariable
 
@@ -65,7 +65,7 @@ class Recorder:
 
     def _of_recording(self, recording: str, results: list[Result]) -> Iterator[Result]:
         matches = [each for each in results if isinstance(each.verdict, Match)]
-        recorded: dict[int, Mapping[str, Recorded]] = {}
+        recorded: dict[int, Mapping[str, CarriedValue]] = {}
         with Members.of_recording(self.dataset, recording) as members:
             for own in self._samples.stretches(members, matches):
                 recorded.update(zip(own.numbers, self._recorded(own, matches), strict=True))
@@ -73,9 +73,9 @@ class Recorder:
         for each in results:
             yield replace(each, recorded=next(told)) if isinstance(each.verdict, Match) else each
 
-    def _recorded(self, own: ResultStretches, matches: Sequence[Result]) -> list[Mapping[str, Recorded]]:
+    def _recorded(self, own: ResultStretches, matches: Sequence[Result]) -> list[Mapping[str, CarriedValue]]:
         """What some results carry, by the name of the value."""
-        found: list[dict[str, Recorded]] = [{} for _ in own.numbers]
+        found: list[dict[str, CarriedValue]] = [{} for _ in own.numbers]
         columns = own.columns(self.scenario)
         proofs = [cast(Match, matches[number].verdict).witness for number in own.numbers]
         for each in self.scenario.records:
@@ -96,7 +96,7 @@ class Recorder:
 
 def _told(
     own: ResultStretches, value: RecordedValue, cells: Sequence[RecordedCell], lacking: Sequence[str]
-) -> Iterator[Recorded]:
+) -> Iterator[CarriedValue]:
     """What each result carries of a value, given that at each sample and why there is none."""
     for chosen in own.slices():
         mine = chosen
@@ -104,7 +104,7 @@ def _told(
             place = mine.start if value.when == "initial" else mine.stop - 1
             mine = slice(place, place + 1)
         reasons = Counter(reason for reason in lacking[mine] if reason)
-        yield Recorded(tuple(cells[mine]), value.when == "always", dict(sorted(reasons.items())))
+        yield CarriedValue(tuple(cells[mine]), value.when == "always", dict(sorted(reasons.items())))
 
 
 def _values(columns: AtomColumns, value: Node) -> tuple[list[RecordedCell], list[str]]:

@@ -16,13 +16,13 @@ from scenicq.errors import Source, Span
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown, Verdict, WitnessValue
 from scenicq.query.execution.result_summary import ResultSummary
 from scenicq.query.execution.results import (
+    CarriedValue,
     IntervalSpan,
     LogDensity,
     ModeRecord,
-    Recorded,
+    ObjectLanes,
     RecordedCell,
     Result,
-    Standing,
 )
 
 __all__ = [
@@ -278,7 +278,7 @@ def record(result: Result, dataset: str = "", *, every: bool = False) -> Record:
                           open_ended=span.open_ended, dataset=origin, **more)  # fmt: skip
 
 
-def recorded_fields(recorded: Mapping[str, Recorded], *, series: bool) -> dict[str, CellRecord | SeriesRecord]:
+def recorded_fields(recorded: Mapping[str, CarriedValue], *, series: bool) -> dict[str, CellRecord | SeriesRecord]:
     """What a result carries as it is written.
 
     Args:
@@ -288,7 +288,7 @@ def recorded_fields(recorded: Mapping[str, Recorded], *, series: bool) -> dict[s
     return {name: _series(each.values) if each.series and series else each.values[0] for name, each in recorded.items()}
 
 
-def _recorded(recorded: Mapping[str, Recorded], *, series: bool) -> dict[str, Any]:
+def _recorded(recorded: Mapping[str, CarriedValue], *, series: bool) -> dict[str, Any]:
     lacking = {name: dict(each.lacking) for name, each in recorded.items() if each.lacking}
     return {"recorded": recorded_fields(recorded, series=series), "unrecorded": lacking or UNSET}
 
@@ -330,14 +330,14 @@ def read_record(record: Record, source: Source) -> Result:
     verdict = _verdict(record, source)
     lacking, told = record.unrecorded or {}, record.recorded
     recorded = None if told is UNSET else {
-        name: Recorded(tuple(each.values), series=True, lacking=lacking.get(name, {}))
+        name: CarriedValue(tuple(each.values), series=True, lacking=lacking.get(name, {}))
         if isinstance(each, SeriesRecord)
-        else Recorded((each,), series=False, lacking=lacking.get(name, {}))
+        else CarriedValue((each,), series=False, lacking=lacking.get(name, {}))
         for name, each in told.items()
     }  # fmt: skip
     standing = None
     if record.lanes is not UNSET:
-        standing = {role: Standing(tuple(each.own), tuple(each.others)) for role, each in record.lanes.items()}
+        standing = {role: ObjectLanes(tuple(each.own), tuple(each.others)) for role, each in record.lanes.items()}
     if isinstance(record, FrameRecord):
         return Result(
             record.frame, record.recording, record.timestamp_us, verdict, record.sensors, recorded=recorded,

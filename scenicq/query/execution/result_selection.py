@@ -21,7 +21,7 @@ from scenicq.match.verdict import Match
 from scenicq.query.execution.recorded_columns import ColumnKind, RecordedColumn
 from scenicq.query.execution.records import Record, SeriesRecord, recorded_fields
 from scenicq.query.execution.result_summary import ResultSummary
-from scenicq.query.execution.results import Chosen, Funnel, RecordedCell, Result
+from scenicq.query.execution.results import Funnel, RecordedCell, Result, SelectionCounts
 from scenicq.syntax import ast
 from scenicq.syntax.parser import parse
 
@@ -118,10 +118,10 @@ class ResultSelection:
             limit,
         )
 
-    def chosen(self) -> Chosen:
+    def chosen(self) -> SelectionCounts:
         """What was chosen, once the results are taken."""
         where, sort = ("" if each is None else each.text for each in (self.where, self.sort))
-        return Chosen(where, sort, self.shown, self.others, self.unclear, self.beyond, self.limit)
+        return SelectionCounts(where, sort, self.shown, self.others, self.unclear, self.beyond, self.limit)
 
     def summary_of(self, whole: ResultSummary, results: int) -> ResultSummary:
         """What the results that are shown say of themselves.

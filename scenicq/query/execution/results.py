@@ -14,17 +14,17 @@ from scenicq.errors import Diagnostic
 from scenicq.match.verdict import Match, NoMatch, Unknown, Verdict
 
 __all__ = [
-    "Chosen",
+    "CarriedValue",
     "Funnel",
     "IntervalSpan",
     "LogDensity",
     "ModeRecord",
+    "ObjectLanes",
     "ProgramPlace",
-    "Recorded",
     "RecordedCell",
     "Result",
     "Sample",
-    "Standing",
+    "SelectionCounts",
     "limit_matches",
 ]
 
@@ -71,7 +71,7 @@ class LogDensity:
 
 
 @dataclass(frozen=True, slots=True)
-class Recorded:
+class CarriedValue:
     """What a result carries of a value that the program records.
 
     Attributes:
@@ -86,7 +86,7 @@ class Recorded:
 
 
 @dataclass(frozen=True, slots=True)
-class Standing:
+class ObjectLanes:
     """In which lanes a label object stands.
 
     Attributes:
@@ -154,8 +154,8 @@ class Result:
     sensors: Mapping[str, str] = field(default_factory=dict[str, str])
     interval: IntervalSpan | None = None
     density: LogDensity | None = None
-    recorded: Mapping[str, Recorded] | None = None
-    lanes: Mapping[str, Standing] | None = None
+    recorded: Mapping[str, CarriedValue] | None = None
+    lanes: Mapping[str, ObjectLanes] | None = None
     timeline: tuple[ModeRecord, ...] | None = None
 
     def __reduce__(self) -> tuple[type[Result], tuple[Any, ...]]:
@@ -181,7 +181,7 @@ class Sample:
 
 
 @dataclass(frozen=True, slots=True)
-class Chosen:
+class SelectionCounts:
     """Which matches were chosen by what they carry.
 
     Attributes:
@@ -201,12 +201,12 @@ class Chosen:
     beyond: int
     limit: int | None = None
 
-    def after(self, before: Chosen | None) -> Chosen:
+    def after(self, before: SelectionCounts | None) -> SelectionCounts:
         """What both have chosen, one out of what the other has left."""
         if before is None:
             return self
         where = f"({before.where}) and ({self.where})" if before.where and self.where else before.where or self.where
-        return Chosen(
+        return SelectionCounts(
             where, self.sort or before.sort, self.shown, before.others + self.others, before.unclear + self.unclear,
             before.beyond + self.beyond, before.limit,
         )  # fmt: skip
@@ -256,7 +256,7 @@ class Funnel:
     cut: bool = False
     limited: Result | None = None
     sample: Sample | None = None
-    chosen: Chosen | None = None
+    chosen: SelectionCounts | None = None
 
     def add(self, other: Funnel) -> None:
         """Count in what was found elsewhere."""

@@ -26,7 +26,7 @@ from scenicq.match.options import MatchOptions
 from scenicq.match.problem.preprocess import prepare_scenario
 from scenicq.match.verdict import Cause, NoMatch
 from scenicq.query.execution.block_executor import BlockExecutor
-from scenicq.query.execution.block_matcher import MAPS_KEPT, CompiledMap, Decided, Decider, has_timelines
+from scenicq.query.execution.block_matcher import MAPS_KEPT, BlockOutcome, CompiledMap, Decider, has_timelines
 from scenicq.query.execution.frames_ahead import FramesAhead, telling
 from scenicq.query.execution.merged_blocks import merge_frames, merge_intervals, until_deadline
 from scenicq.query.execution.never_compared import Coverage, coverage
@@ -636,11 +636,11 @@ class Query:
 
 def _start_worker(
     dataset: DatasetReference, source: Source, options: QueryOptions, files: SiblingFiles
-) -> Callable[[Block, Callable[[object], None]], Decided]:
+) -> Callable[[Block, Callable[[object], None]], BlockOutcome]:
     """What a worker process keeps between blocks."""
     decider = Query(dataset.open(), source, options, files=files).decider(threads=1)
 
-    def work(block: Block, tell: Callable[[object], None]) -> Decided:
+    def work(block: Block, tell: Callable[[object], None]) -> BlockOutcome:
         decided = decider.decide(block)
         found = telling(decided.found, decided.missed, (block.first, block.end), tell)
         return replace(decided, found=list(until_deadline(found, Funnel())))

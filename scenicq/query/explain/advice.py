@@ -50,7 +50,7 @@ from scenicq.store.recorded_tracks import RecordedTracks
 if TYPE_CHECKING:
     import duckdb
 
-__all__ = ["Advice", "Outlook", "advice"]
+__all__ = ["Advice", "ChangeForecast", "advice"]
 
 _ANYWHERE = {"position": 1e5, "heading": math.pi}
 """Sizes of a tolerance by which a feature is as good as not compared."""
@@ -70,7 +70,7 @@ _WIDER_NUMBER = 0.5
 
 
 @dataclass(frozen=True, slots=True)
-class Outlook:
+class ChangeForecast:
     """How many frames there would be with a change.
 
     Attributes:
@@ -105,7 +105,7 @@ class Advice:
     """
 
     first: tuple[tuple[str, int], ...]
-    outlooks: tuple[Outlook, ...]
+    outlooks: tuple[ChangeForecast, ...]
     complete: bool
     hints: tuple[str, ...] = ()
     without_map: int = 0
@@ -155,7 +155,7 @@ def advice(query: Query, *, budget_s: float = math.inf, brief: bool = False) -> 
         (LIMITS.brief_changes, LIMITS.brief_decisions) if brief else (LIMITS.advice_changes, LIMITS.advice_decisions)
     )
     options = replace(query.options, prefilter=True)
-    found: list[Outlook] = []
+    found: list[ChangeForecast] = []
     complete = True
     with ExitStack() as stack, limited(min(budget_s, time_left_s(query.options.until))):
         runs, maps = (LIMITS.brief_runs, LIMITS.brief_maps) if brief else (LIMITS.advice_runs, LIMITS.advice_maps)
@@ -270,7 +270,7 @@ def _sized(name: str, size: float, tolerance: Tolerance) -> Tolerance:
     return replace(tolerance, position=size) if name == "position" else replace(tolerance, heading=size)
 
 
-def _outlook(options: QueryOptions, sample: _Sample, change: Change, solver: LazySolver, most: int) -> Outlook:
+def _outlook(options: QueryOptions, sample: _Sample, change: Change, solver: LazySolver, most: int) -> ChangeForecast:
     """Count the frames that a change leaves, and decide at most so many of them while there is time."""
     left = matched = decided = looked_at = 0
     for name, connection in sample.held.items():
@@ -291,4 +291,4 @@ def _outlook(options: QueryOptions, sample: _Sample, change: Change, solver: Laz
                 break
     sampled = sample.frames < sample.total
     scale = sample.total / sample.frames if sampled and sample.frames else 1.0
-    return Outlook(change, round(scale * matched), round(scale * (matched + left - decided)), sampled)
+    return ChangeForecast(change, round(scale * matched), round(scale * (matched + left - decided)), sampled)

@@ -25,10 +25,10 @@ from scenicq.match.explanation import (
 from scenicq.match.matcher import Matcher
 from scenicq.match.verdict import Match, NoMatch, Unknown, Verdict, WitnessValue
 from scenicq.query.execution.own_lanes import OwnLanes, show_standing
-from scenicq.query.execution.results import Standing
+from scenicq.query.execution.results import ObjectLanes
 from scenicq.query.explain.changes import show_tolerance
 from scenicq.query.explain.margins import SatisfiedConstraint, margins
-from scenicq.query.explain.nearest_miss import Closest, closest, narrow_advice
+from scenicq.query.explain.nearest_miss import NearestMiss, closest, narrow_advice
 from scenicq.query.explain.violations import Violation, violations
 from scenicq.smt.smtlib import to_smtlib
 from scenicq.store.labels import Label
@@ -92,9 +92,9 @@ class Explanation:
     proofs: tuple[Proof, ...] = ()
     margins: tuple[SatisfiedConstraint, ...] = ()
     violations: tuple[Violation, ...] = ()
-    closest: Closest | None = None
+    closest: NearestMiss | None = None
     formulas: tuple[GroupScript, ...] = ()
-    lanes: Mapping[str, Standing] = field(default_factory=dict[str, Standing])
+    lanes: Mapping[str, ObjectLanes] = field(default_factory=dict[str, ObjectLanes])
 
 
 def explain(matcher: Matcher, label: Label, *, formulas: bool = False) -> Explanation:
@@ -263,7 +263,7 @@ def show_explanation(explanation: Explanation) -> str:
     return "\n".join(lines)
 
 
-def _show_advice(nearest: Closest) -> list[str]:
+def _show_advice(nearest: NearestMiss) -> list[str]:
     alone = [f"--tolerance {show_tolerance(each)}" for each in nearest.alone]
     if len(alone) == 1:
         return [f"it would match with {alone[0]}"]

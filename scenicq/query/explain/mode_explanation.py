@@ -10,7 +10,7 @@ import numpy as np
 from scenicq.compiler.contract_bounds import BOUNDS
 from scenicq.forest.nodes import Compare, CompareOp, Feature, Logic, LogicOp, Node
 from scenicq.forest.scenario import Scenario
-from scenicq.forest.temporal import Activity, Arm, Process, Test, Wait
+from scenicq.forest.temporal import Activity, Process, StartTimer, Test, Wait
 from scenicq.forest.walk import postorder
 from scenicq.query.explain.bands import KnownConditions, shorten, sides_over
 from scenicq.store.tracks import RecordingTracks
@@ -166,7 +166,7 @@ def _asked_in(process: Process, activity: Activity) -> Iterator[int]:
         # who shows what it must has time again
         while isinstance(test := process.steps[at], Test):
             kept = process.steps[test.then]
-            if not (isinstance(kept, Arm) and kept.extends):
+            if not (isinstance(kept, StartTimer) and kept.extends):
                 break
             yield test.condition.number
             at = kept.then

@@ -34,7 +34,7 @@ from scenicq.query.prefilter.plan import make_plan
 from scenicq.store.labels import Label
 
 __all__ = [
-    "Closest",
+    "NearestMiss",
     "closest",
     "narrow_advice",
     "nearest_misses",
@@ -49,7 +49,7 @@ _BATCH = 256
 
 
 @dataclass(frozen=True, slots=True)
-class Closest:
+class NearestMiss:
     """The least widening under which a label matches.
 
     Attributes:
@@ -98,7 +98,7 @@ def with_parts(tolerance: Tolerance, parts: Mapping[str, float]) -> Tolerance:
     )
 
 
-def closest(matcher: Matcher, label: Label, most_m: float = MOST_M) -> Closest | None:
+def closest(matcher: Matcher, label: Label, most_m: float = MOST_M) -> NearestMiss | None:
     """The smallest widening of the matcher's tolerance under which a label matches.
 
     Args:
@@ -111,7 +111,7 @@ def closest(matcher: Matcher, label: Label, most_m: float = MOST_M) -> Closest |
     """
     patient = replace(matcher.options, timeout_s=min(matcher.options.timeout_s, _TIMEOUT_S))
 
-    reached: dict[float, Closest] = {}
+    reached: dict[float, NearestMiss] = {}
 
     def matches(widening_m: float) -> bool:
         if widening_m in reached:
@@ -119,7 +119,7 @@ def closest(matcher: Matcher, label: Label, most_m: float = MOST_M) -> Closest |
         tolerance = widen_tolerance(patient.tolerance, widening_m)
         finding = matcher.relaxed(replace(patient, tolerance=tolerance)).examine(label)
         if isinstance(finding.verdict, Match):
-            reached[widening_m] = Closest(widening_m, tolerance, finding)
+            reached[widening_m] = NearestMiss(widening_m, tolerance, finding)
         return widening_m in reached
 
     if matches(0.0):
@@ -132,7 +132,7 @@ def closest(matcher: Matcher, label: Label, most_m: float = MOST_M) -> Closest |
     return None if found is None else reached[found]
 
 
-def narrow_advice(matcher: Matcher, label: Label, found: Closest) -> Closest:
+def narrow_advice(matcher: Matcher, label: Label, found: NearestMiss) -> NearestMiss:
     """What is advised for a label: no part wider than it must be, and the parts that are enough alone.
 
     Args:
@@ -209,14 +209,14 @@ class _Ranking:
     """
 
     count: int
-    heap: list[tuple[float, tuple[int, int], Matcher, Label, Closest]]
+    heap: list[tuple[float, tuple[int, int], Matcher, Label, NearestMiss]]
 
     @property
     def bound(self) -> float:
         """Metres beyond which a frame does not matter."""
         return MOST_M if len(self.heap) < self.count else -self.heap[0][0]
 
-    def add(self, found: Closest, place: tuple[int, int], matcher: Matcher, label: Label) -> None:
+    def add(self, found: NearestMiss, place: tuple[int, int], matcher: Matcher, label: Label) -> None:
         """Take a frame in, in place of the farthest one."""
         entry = (-found.widening_m, (-place[0], -place[1]), matcher, label, found)
         if len(self.heap) < self.count:
@@ -282,7 +282,7 @@ def tell_cut(query: Query, most: int, what: str) -> None:
         query.funnel.warnings.append(warning)
 
 
-def _result(matcher: Matcher, label: Label, found: Closest) -> Result:
+def _result(matcher: Matcher, label: Label, found: NearestMiss) -> Result:
     advice = narrow_advice(matcher, label, found)
     assert isinstance(advice.finding.verdict, Match)
     told = " or ".join(map(show_tolerance, advice.alone or (advice.tolerance,)))

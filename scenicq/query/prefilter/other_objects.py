@@ -108,15 +108,17 @@ def proof(part: Node, scenario: Scenario, classes: Granularity) -> ColumnConditi
 
 def conditions_of(root: Node) -> Iterator[Node]:
     """The parts of a condition that all must hold; whoever plays a role in a frame is seen in it."""
-    for part in conjuncts(root):
-        match part:
-            case Select(
-                index=Compare(CompareOp.EQ, Feature(property=name) as one, Feature() as other),
-                options=(Constant(value=False), seen),
-            ) if name == IDENTITY and (one.object, one.property) == (other.object, other.property):
-                yield from conditions_of(seen)
-            case _:
-                yield part
+    todo = [root]
+    while todo:
+        for part in conjuncts(todo.pop()):
+            match part:
+                case Select(
+                    index=Compare(CompareOp.EQ, Feature(property=name) as one, Feature() as other),
+                    options=(Constant(value=False), seen),
+                ) if name == IDENTITY and (one.object, one.property) == (other.object, other.property):
+                    todo.append(seen)
+                case _:
+                    yield part
 
 
 @dataclass(frozen=True, slots=True)

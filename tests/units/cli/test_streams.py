@@ -330,6 +330,18 @@ def test_an_odd_stream_is_told_or_makes_no_difference(what, stream, kind, usual,
         assert (given, re.sub(r"in [0-9.]+ s", "", said)) == (data, re.sub(r"in [0-9.]+ s", "", told))
 
 
+@pytest.mark.parametrize("kind", STREAMS["stdin"])
+@pytest.mark.parametrize("line", ["match - DATASET", "check -", "explain - DATASET f", "sample - -o made"])
+@pytest.mark.one_in(4)
+def test_a_program_is_not_read_from_what_cannot_be_read(line, kind, command, crossroads, tmp_path):
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    words = [command, *(crossroads if word == "DATASET" else word for word in line.split())]
+    ended, given, said = outcome_with("stdin", kind, words, folder)
+    assert (ended, given, contents(folder)) == (2, b"", [])
+    assert re.fullmatch(r"error\[file-(missing|invalid)\]: standard input (is closed|cannot be read: .*)\n", said), said
+
+
 def test_every_command_is_among_those_with_odd_streams():
     assert {line.split()[0] for line in ALL_COMMANDS.values() if line} >= set(main.COMMANDS)
 

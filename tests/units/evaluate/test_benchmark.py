@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from scenicq.evaluate.benchmark import benchmark_figures
-from scenicq.evaluate.detection import DISTANCES, FoundWithin, detect
+from scenicq.evaluate.detection import DISTANCES, DetectionDistances, detect
 from scenicq.importers.predictions import ARGOVERSE2, NUSCENES, PLAIN, Predictions, Protocol
 from scenicq.store.dataset import Dataset, open_dataset
 from scenicq.store.labels import Label, LabelObject, OutOfPlane, Recording
@@ -104,7 +104,7 @@ def test_a_class_may_have_a_distance_of_its_own(dataset, protocol):
         (f"2,{person}=0.5", {person}),
         ({"": 0.5, car: 4}, {person}),
     ):
-        within = FoundWithin.of(DISTANCES.read(said))
+        within = DetectionDistances.of(DISTANCES.read(said))
         lost = {found.classes[n] for n in found.object_class[np.isneginf(found.found_score(within))]}
         false = {found.classes[n] for n in found.prediction_class[found.is_false(within)]}
         assert lost == false == missed, said

@@ -22,9 +22,9 @@ from scenicq.forest.columns import (
     DEFINED,
     UNDEFINED,
     UNKNOWN,
-    Coded,
+    CodedValues,
     Column,
-    Placed,
+    PlacedRegions,
     column_of,
     constant_column,
     truth_of,
@@ -196,7 +196,7 @@ def test_shapes_at_columns_agree_with_regions():
     }
     for node, region in shapes.items():
         domain = domain_of(values)
-        assert isinstance(computed(node, domain).data, Placed)
+        assert isinstance(computed(node, domain).data, PlacedRegions)
         away, held = computed(Distance(node, target), domain), computed(Contains(node, target), domain)
         for k in range(rows):
             assert away.data[k] == pytest.approx(distance(region(k), x[k], y[k]), abs=1e-9)
@@ -284,12 +284,12 @@ def test_what_is_observed_is_undefined_where_it_is_of_another_kind(kind, seen):
             continue
         expected = evaluate(mood, {}, {(0, "mood"): value})
         if isinstance(expected, Undefined | float | bool | tuple):
-            assert not isinstance(column.data, Coded) or column.data.options[column.data.which[place]] == expected
-            if not isinstance(column.data, Coded):
+            assert not isinstance(column.data, CodedValues) or column.data.options[column.data.which[place]] == expected
+            if not isinstance(column.data, CodedValues):
                 assert agrees(column, place, (3,), expected)
         else:
             assert kind == "other"
-            assert isinstance(column.data, Coded)
+            assert isinstance(column.data, CodedValues)
 
 
 @pytest.mark.parametrize("text", ["much", ""])
@@ -350,7 +350,7 @@ def test_numbers_and_vectors_are_computed_for_all_places_together(name):
 def test_a_value_that_is_the_same_everywhere_is_so_at_any_number_of_places(value):
     column = constant_column(value)
     parts = column.data if isinstance(column.data, tuple) else (column.data,)
-    arrays = [part.which if isinstance(part, Coded) else part for part in parts]
+    arrays = [part.which if isinstance(part, CodedValues) else part for part in parts]
     for count in (1, 5):
         assert {np.broadcast_to(each, count).shape for each in (*arrays, column.status)} == {(count,)}
         assert np.broadcast_to(truth_of(column.data), count).shape == (count,)

@@ -8,7 +8,7 @@ import pytest
 
 from scenicq.geometry.default_street import street
 from scenicq.geometry.features import MapFeature, read_geojson
-from scenicq.geometry.links import DIRECTS, IS_SECTION, LINKS, link_named, links_of
+from scenicq.geometry.links import DIRECTS, IS_SECTION, LINKS, find_link, links_of
 from scenicq.geometry.network import Network
 
 SAMPLES = Path(__file__).parents[3] / "sample_data"
@@ -83,4 +83,4 @@ def test_lanes_direct_what_has_their_direction(name: str):
     ],
 )
 def test_attributes_are_links(kind: str, attribute: str, found: tuple[str, bool] | None):
-    assert link_named(kind, attribute) == found
+    assert find_link(kind, attribute) == found

@@ -40,7 +40,7 @@ OPERATIONS = {
     "intersection": shapes.intersection,
     "difference": shapes.difference,
     "shared area": lambda a, b: shapes.shared_areas(np.array([a]), np.array([b])),
-    "division": lambda a, b: shapes.divided(a, [b]),
+    "division": lambda a, b: shapes.divide_polygon(a, [b]),
 }
 
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from shapely.geometry import LineString, Point, Polygon, box
 
 from scenicq.geometry.angles import distance, rotate_array
-from scenicq.geometry.cell_guards import Nearer, Within, half_planes, narrowed
+from scenicq.geometry.cell_guards import NearestSegment, Within, half_planes, narrow_guards
 from scenicq.geometry.fields import VectorField
 from scenicq.geometry.followed_direction import OFF_ROAD, FollowedDirection
 from scenicq.geometry.road_direction import DirectedLane, RoadDirection, along_lines
@@ -130,12 +130,12 @@ def test_half_planes_hold_what_guards_mean(field: RoadDirection, seed: int) -> N
             continue
         for a, b, c in half_planes(part.guards, bounds):
             for px, py in rng.uniform(bounds[:2], bounds[2:], (30, 2)).tolist():
-                assert a * px + b * py <= c or narrowed(part.guards, (px, py, px, py)) is None
+                assert a * px + b * py <= c or narrow_guards(part.guards, (px, py, px, py)) is None
 
 
 def test_half_planes_are_as_close_as_a_border_is_straight() -> None:
     # the border between a line and a point 5 m beside it is x = 2.5 + y ** 2 / 10
-    guard = Nearer(np.array([(0.0, -9.0, 0.0, 9.0)]), np.array([(5.0, 0.0, 5.0, 0.0)]))
+    guard = NearestSegment(np.array([(0.0, -9.0, 0.0, 9.0)]), np.array([(5.0, 0.0, 5.0, 0.0)]))
     for half in (0.1, 0.01):
         ((a, b, c),) = half_planes([guard], (2.5 - half, -half, 2.5 + half, half))
         assert (a, b) == pytest.approx((2.0, 0.0))

@@ -16,7 +16,7 @@ from scenicq.geometry.network import Network
 from scenicq.importers.base import ImportOptions
 from scenicq.importers.fields import InvalidError
 from scenicq.importers.ingest import ingest
-from scenicq.importers.lane_parts import Beside, cut_lanes
+from scenicq.importers.lane_parts import AdjacentLane, cut_lanes
 from scenicq.importers.protobuf import integers, parse, to_signed
 from scenicq.importers.report import Report
 from scenicq.importers.tfrecord import crc32c, records
@@ -134,13 +134,13 @@ class TestNeighbours:
             ends = sorted({0.0, 100.0, *(float(10 * random.integers(1, 10)) for _ in range(3))})
             rows.append([(f"{row}.{number}", a, b) for number, (a, b) in enumerate(pairwise(ends))])
         lengths = {name: b - a for row in rows for name, a, b in row}
-        beside: dict[str, list[Beside]] = {name: [] for name in lengths}
+        beside: dict[str, list[AdjacentLane]] = {name: [] for name in lengths}
         for lower, upper in pairwise(rows):
             for (one, a, b), (other, c, d) in product(lower, upper):
                 if (low := max(a, c)) < (high := min(b, d)):
                     mine, its = ((low - a) / (b - a), (high - a) / (b - a)), ((low - c) / (d - c), (high - c) / (d - c))
-                    beside[one].append(Beside(other, True, *mine, *its))
-                    beside[other].append(Beside(one, False, *its, *mine))
+                    beside[one].append(AdjacentLane(other, True, *mine, *its))
+                    beside[other].append(AdjacentLane(one, False, *its, *mine))
         parts = cut_lanes(lengths, beside, 0.75)
         place = {name: (a, b) for row in rows for name, a, b in row}
 

@@ -11,7 +11,7 @@ from comparisons import between, c
 from scenicq.forest import build
 from scenicq.forest.groups import Comparison
 from scenicq.forest.nodes import Constant, DirectionAt, Rotate, VectorOf, VectorSum
-from scenicq.geometry.cell_guards import Nearer
+from scenicq.geometry.cell_guards import NearestSegment
 from scenicq.geometry.fields import FieldCell
 
 SIDE = 4.0
@@ -57,7 +57,7 @@ class Patchwork:
             for heading in sorted({self.at(*each) for each in inside}):
                 own = middles(each for each in inside if self.at(*each) == heading)
                 rivals = middles(each for each in inside if self.at(*each) != heading)
-                found.append(FieldCell(square, heading, (Nearer(own, rivals),) if len(rivals) else ()))
+                found.append(FieldCell(square, heading, (NearestSegment(own, rivals),) if len(rivals) else ()))
         return found
 
     def headings(self, boxes):

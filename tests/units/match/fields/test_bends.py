@@ -33,8 +33,8 @@ def cases(monkeypatch):
         counts.append(some.size)
         return propagated(some)
 
-    propagated = heading_propagation.propagated
-    monkeypatch.setattr(heading_propagation, "propagated", counted)
+    propagated = heading_propagation.propagate
+    monkeypatch.setattr(heading_propagation, "propagate", counted)
     return counts
 
 

@@ -16,7 +16,7 @@ from scenicq.forest.nodes import PointIn
 from scenicq.forest.walk import leaves
 from scenicq.match.decide.decomposition import decide_decomposed
 from scenicq.match.fields import cell_assignment, field_solver, interval_domain
-from scenicq.match.fields.field_solver import repaired
+from scenicq.match.fields.field_solver import repair_solution
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.evaluation import replay
@@ -67,7 +67,7 @@ def test_enclosures_of_points_are_points():
     zero, one = np.zeros((2, 1)), np.ones((2, 1))
     quarter = interval_domain.turning(np.full((2, 1), math.pi / 2))
     assert interval_domain.rotate(np.stack([zero, one]), quarter)[..., 0] == pytest.approx(np.array([[-1, -1], [0, 0]]))
-    assert interval_domain.nothing_left(interval_domain.common(one, one + 1)).tolist() == [True]
+    assert interval_domain.find_empty(interval_domain.common(one, one + 1)).tolist() == [True]
     assert np.isinf(interval_domain.divide(one, zero)).all()
 
 
@@ -130,13 +130,13 @@ def test_what_misses_a_solution_by_little_is_repaired():
                 key: value + rng.uniform(-0.02, 0.02) if key in numbers else value
                 for key, value in found.values.items()
             }
-            again = repaired(items, off, tolerance)
+            again = repair_solution(items, off, tolerance)
             assert again is not None
             assert replay(items, again.values, tolerance, 1e-6)
             # a solver leaves out what it did not need
             for key in numbers:
-                some = repaired(items, {each: value for each, value in off.items() if each != key}, tolerance)
+                some = repair_solution(items, {each: value for each, value in off.items() if each != key}, tolerance)
                 assert some is None or replay(items, some.values, tolerance, 1e-6)
             far = {key: value + 1.0 if key in numbers else value for key, value in found.values.items()}
-            count += repaired(items, far, tolerance) is None
+            count += repair_solution(items, far, tolerance) is None
     assert count

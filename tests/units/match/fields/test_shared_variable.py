@@ -19,7 +19,7 @@ from scenicq.forest.nodes import ArithmeticOp, Constant, DirectionAt, VectorOf
 from scenicq.forest.walk import leaves
 from scenicq.match.decide.decomposition import decide_decomposed
 from scenicq.match.fields import field_solver, shared_variable
-from scenicq.match.fields.shared_variable import find_shared_value, joined
+from scenicq.match.fields.shared_variable import find_shared_value, join_intervals
 from scenicq.match.linear.linear_relaxation import extent_affine
 from scenicq.match.problem.evaluation import replay
 from scenicq.match.problem.outcome import Refuted, Satisfied, Undecided, finish
@@ -55,7 +55,7 @@ def test_the_extent_of_a_number_is_that_of_the_equation():
 
 
 def test_intervals_that_meet_are_one():
-    assert joined([(3.0, 4.0), (0.0, 1.0), (0.5, 2.0), (2.0, 2.5)]) == [(0.0, 2.5), (3.0, 4.0)]
+    assert join_intervals([(3.0, 4.0), (0.0, 1.0), (0.5, 2.0), (2.0, 2.5)]) == [(0.0, 2.5), (3.0, 4.0)]
 
 
 @pytest.fixture
@@ -86,7 +86,9 @@ def test_a_way_without_a_solution_excludes_only_if_its_program_is_exact(monkeypa
     ways = [replace(part[0], exact=one, vague=[]) for part, one in zip(parts, exact, strict=False)]
     limits = next(each.limits for each in ways)
     ways = [[replace(way, limits=limits)] for way in ways]
-    monkeypatch.setattr(shared_variable, "solved", lambda way, *_: Undecided(way.case.network.items[0][0], "nonlinear"))
+    monkeypatch.setattr(
+        shared_variable, "solve_cells", lambda way, *_: Undecided(way.case.network.items[0][0], "nonlinear")
+    )
     monkeypatch.setattr(shared_variable, "extent", lambda *_: None)
     outcome = find_shared_value(ways, *rest)
     # the first part is asked first, and is the one that has nothing left

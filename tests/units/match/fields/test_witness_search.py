@@ -113,7 +113,7 @@ def test_with_and_without_trials_the_verdict_is_the_same(name, monkeypatch):
 def test_where_ways_are_many_more_draws_find_what_few_have_missed(monkeypatch):
     scenario = compiled(ON_BEND + AHEAD, BEND)
     matcher = Matcher(scenario, MatchOptions())
-    search, propagated = field_solver.find_witness, heading_propagation.propagated
+    search, propagated = field_solver.find_witness, heading_propagation.propagate
     efforts, cases = [], []
     useful = [False, True]
 
@@ -127,7 +127,7 @@ def test_where_ways_are_many_more_draws_find_what_few_have_missed(monkeypatch):
 
     monkeypatch.setattr(field_solver, "find_witness", noted)
     monkeypatch.setattr(witness_search, "search_witness", lambda *_, **__: None)
-    monkeypatch.setattr(heading_propagation, "propagated", counted)
+    monkeypatch.setattr(heading_propagation, "propagate", counted)
     label = label_of(scenario, drawn(scenario, 1), random.Random(1))
     for _ in useful:
         cases.append(0)

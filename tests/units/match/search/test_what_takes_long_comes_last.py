@@ -58,13 +58,13 @@ def junction() -> Network:
 def cases(monkeypatch):
     """How many cases were looked at of which way fields point."""
     seen = [0]
-    propagated = heading_propagation.propagated
+    propagated = heading_propagation.propagate
 
     def counted(some):
         seen[0] += some.size
         return propagated(some)
 
-    monkeypatch.setattr(heading_propagation, "propagated", counted)
+    monkeypatch.setattr(heading_propagation, "propagate", counted)
     return seen
 
 

@@ -16,7 +16,7 @@ from scenicq.evaluate.annotations import Annotations, Frames
 from scenicq.query.execution.records import FrameRecord, IntervalRecord, Record
 from scenicq.query.execution.result_summary import Completeness
 
-__all__ = ["Matched", "Played", "read_matched"]
+__all__ = ["FrameSplit", "RolePlayers", "split_frames"]
 
 Bools = NDArray[np.bool_]
 
@@ -26,7 +26,7 @@ _LARGEST = 700.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Played:
+class RolePlayers:
     """The label objects that play one role.
 
     Attributes:
@@ -39,7 +39,7 @@ class Played:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Matched:
+class FrameSplit:
     """The frames of a dataset as one query divides them.
 
     Attributes:
@@ -59,7 +59,7 @@ class Matched:
     matching: Bools
     decided: Bools
     settled: Bools
-    roles: tuple[Played, ...]
+    roles: tuple[RolePlayers, ...]
     witness: Mapping[int, Mapping[str, Any]]
     log_weight: NDArray[np.float64] | None = None
     every: bool = True
@@ -71,10 +71,10 @@ class Matched:
         return self.matching & self.settled if self.every else np.zeros(len(self.matching), dtype=np.bool_)
 
 
-def read_matched(
+def split_frames(
     name: str, records: Iterable[Record], frames: Frames, objects: Annotations,
     completeness: Callable[[], Completeness] | None = None,
-) -> Matched:  # fmt: skip
+) -> FrameSplit:  # fmt: skip
     """Divide the frames of a dataset by the results of a query.
 
     Frames that the results do not name do not match, where the results are complete: a query names what matches and
@@ -130,12 +130,12 @@ def read_matched(
         said = completeness()
         _mark_silent(unknown, frames, said)
         variables = {} if said.summary is None else said.summary.variables
-    return Matched(
+    return FrameSplit(
         name=name,
         matching=matching,
         decided=matching | ~unknown,
         settled=~unknown,
-        roles=tuple(Played(role, np.array(sorted(numbers), dtype=np.int64)) for role, numbers in played.items()),
+        roles=tuple(RolePlayers(role, np.array(sorted(numbers), dtype=np.int64)) for role, numbers in played.items()),
         witness=witness,
         log_weight=log_weight if ranked else None,
         every=every,
