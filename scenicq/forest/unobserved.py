@@ -229,12 +229,17 @@ class _Reader:
         parts = [self.truths(build.compare(op, arg, bound, span), selects) for arg in extreme.args]
         return join(LogicOp.OR if least is below else LogicOp.AND, *parts)
 
+    def _is_unknown(self, node: Node) -> bool:
+        """Whether nothing will be known of a node; what is asked of label objects may, once what it is given is known."""
+        given = isinstance(node, Among) and all(isinstance(each, Constant) for each in node.inputs)
+        return (isinstance(node, Feature) or (isinstance(node, Among) and given)) and self._unobserved(node)
+
     def _atom(self, node: Node, reading: set[int], selects: int) -> Truths:
         """The truths of a condition on values: what is equal for all outcomes of a choice inside is known."""
         inside = (each for each in postorder((node,)) if isinstance(each, Select) and each is not node)
         choice = next((each for each in inside if id(each) in reading), None)
         if choice is None or selects == 0:
-            if any(isinstance(each, Feature) and self._unobserved(each) for each in postorder((node,))):
+            if any(map(self._is_unknown, postorder((node,)))):
                 return _of_speed(node, reading)
             return truths_by_ends(node)
         outcomes: list[Node] = []

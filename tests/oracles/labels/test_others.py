@@ -19,6 +19,7 @@ import pytest
 
 from scenicq.errors import ScenarioError, Source
 from scenicq.match.options import MatchOptions
+from scenicq.match.problem.outcome import UNOBSERVED
 from scenicq.match.verdict import Match, Unknown
 from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.dataset import Dataset, open_dataset
@@ -390,6 +391,7 @@ def judge(text, roles, conditions, label, way, verdict, seen, draw):
         seen["unknown"] += 1
         assert not sure, about
         assert any(truth is None for truth, _ in every), about
+        assert verdict.reason == UNOBSERVED, about
     else:
         seen["no"] += 1
         assert not sure, about
