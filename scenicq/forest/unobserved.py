@@ -230,7 +230,7 @@ class _Reader:
         return join(LogicOp.OR if least is below else LogicOp.AND, *parts)
 
     def _is_unknown(self, node: Node) -> bool:
-        """Whether nothing will be known of a node; what is asked of label objects may, once what it is given is known."""
+        """Whether nothing will be known of a node; label objects may tell more once what is asked of them is given."""
         given = isinstance(node, Among) and all(isinstance(each, Constant) for each in node.inputs)
         return (isinstance(node, Feature) or (isinstance(node, Among) and given)) and self._unobserved(node)
 

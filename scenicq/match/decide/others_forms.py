@@ -9,16 +9,15 @@ from collections.abc import Callable
 from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scenicq.errors import CannotEvaluate
 from scenicq.forest.among import LABEL_OBJECTS, LabelElements, among_column, asks_others
 from scenicq.forest.clear_columns import ClearColumns
 from scenicq.forest.column_domain import first_direction
-from scenicq.forest.columns import DEFINED, Column, constant_column, truth_of
+from scenicq.forest.columns import DEFINED, Column, Data, constant_column, truth_of
 from scenicq.forest.groups import Condition, Group
 from scenicq.forest.interpret import interpret, steps_of
-from scenicq.forest.nodes import Constant, DirectionAt, Feature
+from scenicq.forest.nodes import COURSE, Constant, DirectionAt, Feature
 from scenicq.forest.walk import is_leaf, postorder
 from scenicq.match.decide.closed_form import ClosedForm, GroupEvaluation
 from scenicq.match.decide.range_forms import Columns, Lookup
@@ -26,7 +25,10 @@ from scenicq.match.options import MatchOptions
 from scenicq.match.problem.map_lookups import MapLookups
 from scenicq.store.classes import Granularity
 
-__all__ = ["others_form_of"]
+__all__ = ["COURSES", "others_form_of"]
+
+COURSES = "courses"
+"""The column of the courses of label objects, which other forms than those here do not take: they are no numbers."""
 
 
 def others_form_of(group: Group) -> ClosedForm | None:
@@ -50,7 +52,8 @@ def others_form_of(group: Group) -> ClosedForm | None:
         elements = of_classes(options.classes)
 
         def observed(node: Feature) -> Column:
-            return Column(cast("NDArray[np.float64]", get(node.object, node.property)), np.full(1, DEFINED))
+            name = COURSES if node.property == COURSE else node.property
+            return Column(cast("Data", get(node.object, name)), np.full(1, DEFINED))
 
         def drawn(*_: object) -> Column:
             raise CannotEvaluate("a random variable")

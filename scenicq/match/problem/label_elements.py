@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.forest.among import LABEL_OBJECTS, LabelElements
-from scenicq.forest.columns import DEFINED, Column, column_of
-from scenicq.forest.nodes import IDENTITY, RANK, TRACK, Value
+from scenicq.forest.columns import DEFINED, UNKNOWN, Column, column_of
+from scenicq.forest.nodes import IDENTITY, OPEN, RANK, TRACK, Value
 from scenicq.match.problem.candidates import LabelProblem
 from scenicq.store.classes import Granularity, class_truth
 from scenicq.store.labels import Label, LabelObject
@@ -74,6 +74,8 @@ def elements_of(
         if name == "position":
             x, y = np.array([(each.x, each.y) for each in objects], dtype=np.float64).reshape(-1, 2).T
             return Column((x, y), np.full(len(objects), DEFINED))
+        if name == OPEN:
+            return Column(np.zeros(len(objects)), np.full(len(objects), UNKNOWN))
         return column_of([seen(*each).get(name) for each in zip(place.tolist(), numbers, strict=True)])
 
     known = np.ones(len(labels), np.bool_)

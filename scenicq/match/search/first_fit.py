@@ -21,12 +21,13 @@ from numpy.typing import NDArray
 from scenicq.budget import look
 from scenicq.errors import CannotEvaluate
 from scenicq.forest.among import LABEL_OBJECTS
+from scenicq.forest.columns import CodedValues
 from scenicq.forest.groups import Constraint
 from scenicq.forest.nodes import COURSE, GOING, LAST_LANE, RANK, WHO, Identity, LaneCourse, Leaf, Value
 from scenicq.forest.scenario import Scenario
 from scenicq.limits import LIMITS
 from scenicq.match.decide.closed_form import ClosedForm, GroupEvaluation
-from scenicq.match.decide.others_forms import others_form_of
+from scenicq.match.decide.others_forms import COURSES, others_form_of
 from scenicq.match.decide.range_forms import Columns, FloatColumn, Lookup
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import Candidates
@@ -78,6 +79,11 @@ class LabelRow:
             if course is not None:
                 seen = self.seen[number] = {**seen, COURSE: course}
         return seen
+
+    def observed_beside(self, number: int) -> Mapping[str, Value]:
+        """What is observed of a label object that need not play a role, without its course: that takes long."""
+        seen = self.seen.get(number)
+        return observe(_label_object(self.label, number)) if seen is None else seen
 
 
 @dataclass(frozen=True, slots=True)
@@ -373,13 +379,16 @@ def _column(
     """
     if (index, name) == LABEL_OBJECTS:
         some = functools.partial(
-            elements_of, [row.label for row in rows], lambda place, number: rows[place].observed(number)
+            elements_of, [row.label for row in rows], lambda place, number: rows[place].observed_beside(number)
         )
         return cast(FloatColumn, functools.cache(some))
     rank = ranks[index]
     if name in WHO:
         return _who(rows, [mine[rank] for mine in numbers], name)
     playing = [(row, mine[rank]) for row, mine in zip(rows, numbers, strict=True)]
+    if name == COURSES:
+        courses = tuple(row.observed(number)[COURSE] for row, number in playing)
+        return cast(FloatColumn, CodedValues(np.arange(len(courses)), courses))
     if name == GOING:
         name = "heading"  # nan where there is none
     elif name == LAST_LANE:
