@@ -27,7 +27,7 @@ from scenicq.forest.nodes import COURSE, GOING, LAST_LANE, RANK, WHO, Identity, 
 from scenicq.forest.scenario import Scenario
 from scenicq.limits import LIMITS
 from scenicq.match.decide.closed_form import ClosedForm, GroupEvaluation
-from scenicq.match.decide.others_forms import COURSES, others_form_of
+from scenicq.match.decide.observed_forms import COURSES, observed_form_of
 from scenicq.match.decide.range_forms import Columns, FloatColumn, Lookup
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import Candidates
@@ -465,7 +465,7 @@ def _listed(values: FloatColumn | Sequence[T] | T, size: int) -> list[T]:
 
 def first_fit_of(plan: MatchPlan, scenario: Scenario) -> FirstFit | None:
     """The plan made ready; None if some group has no closed form, or there are too many."""
-    told = ((group, group.closed_form or others_form_of(group.group)) for group in plan.groups)
+    told = ((group, group.closed_form or observed_form_of(group.group)) for group in plan.groups)
     forms = [(group, form) for group, form in told if form is not None]
     if len(forms) < len(plan.groups):
         return None

@@ -141,7 +141,7 @@ STEPS: dict[str, Off] = {
     "most constrained first": _set(backtracking, "_order", lambda slots, *_: sorted(slots, key=lambda s: s.name)),
     "answers kept": _set(group_cache.GroupCache, "of", _anew),
     "first fit": _set(FirstFit, "fill", lambda *_: iter(())),
-    "forms of others": _set(first_fit, "others_form_of", lambda *_: None),
+    "forms of what is observed": _set(first_fit, "observed_form_of", lambda *_: None),
     "closed forms": _set(group_plan, "closed_form_of", lambda *_: None),
     "arc consistency": _set(label_search, "arc_consistent", lambda plan, candidates, *_: (candidates, None)),
     "subgroups": _set(group_plan, "subgroups_of", lambda *_: ()),

@@ -1,11 +1,11 @@
-"""Conditions on label objects without a role, of many labels side by side: for which labels they surely hold.
+"""Conditions on what is observed, also of label objects without a role: for which of many labels they surely hold.
 
 Nothing is said of a label alone, and where they do not surely hold: a search of its own tells.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import cast
 
 import numpy as np
@@ -17,7 +17,7 @@ from scenicq.forest.column_domain import first_direction
 from scenicq.forest.columns import DEFINED, Column, Data, constant_column, truth_of
 from scenicq.forest.groups import Condition, Group
 from scenicq.forest.interpret import interpret, steps_of
-from scenicq.forest.nodes import COURSE, Constant, DirectionAt, Feature
+from scenicq.forest.nodes import COURSE, Among, Constant, DirectionAt, Feature
 from scenicq.forest.walk import is_leaf, postorder
 from scenicq.match.decide.closed_form import ClosedForm, GroupEvaluation
 from scenicq.match.decide.range_forms import Columns, Lookup
@@ -25,31 +25,41 @@ from scenicq.match.options import MatchOptions
 from scenicq.match.problem.map_lookups import MapLookups
 from scenicq.store.classes import Granularity
 
-__all__ = ["COURSES", "others_form_of"]
+__all__ = ["COURSES", "observed_form_of"]
 
 COURSES = "courses"
 """The column of the courses of label objects, which other forms than those here do not take: they are no numbers."""
 
 
-def others_form_of(group: Group) -> ClosedForm | None:
-    """The form of a group that is one condition on others of what is observed; None for any other."""
-    if group.doubtful or len(group.constraints) != 1:
+def observed_form_of(group: Group) -> ClosedForm | None:
+    """The form of a group that is one condition on what is observed; None for any other.
+
+    What is known up to two ends, as along a course, holds if it does at both.
+    """
+    constraints = group.certain_group.constraints
+    if len(constraints) != 1:
         return None
-    (item,) = group.constraints
-    if not isinstance(item, Condition) or not asks_others(item.expression):
+    (item,) = constraints
+    if not isinstance(item, Condition):
         return None
+    others = asks_others(item.expression)
     nodes = list(postorder((item.expression,)))
     # where several directions are allowed, any of them will do
     if any(is_leaf(node) or isinstance(node, DirectionAt) for node in nodes):
+        return None
+    # parameters are no column
+    if any(isinstance(node, Feature) and node.object < 0 for node in nodes):
         return None
     known = {id(node): constant_column(node.value) for node in nodes if isinstance(node, Constant)}
     steps = steps_of(item.expression, known=known)
 
     def evaluate(get: Lookup, options: MatchOptions, lookups: MapLookups) -> GroupEvaluation:
         if not isinstance(get, Columns):
-            raise CannotEvaluate("others of a label alone")
-        of_classes = cast("Callable[[Granularity], LabelElements]", get(*LABEL_OBJECTS))
-        elements = of_classes(options.classes)
+            raise CannotEvaluate("a label alone")
+
+        def among(node: Among, args: Sequence[Column]) -> Column:
+            of_classes = cast("Callable[[Granularity], LabelElements]", get(*LABEL_OBJECTS))
+            return among_column(node, args, of_classes(options.classes))
 
         def observed(node: Feature) -> Column:
             name = COURSES if node.property == COURSE else node.property
@@ -58,9 +68,7 @@ def others_form_of(group: Group) -> ClosedForm | None:
         def drawn(*_: object) -> Column:
             raise CannotEvaluate("a random variable")
 
-        domain = ClearColumns(
-            observed, drawn, first_direction, others=lambda node, args: among_column(node, args, elements)
-        )
+        domain = ClearColumns(observed, drawn, first_direction, others=among if others else None)
         data, status = interpret(steps, domain, known)[id(item.expression)]
         holds = np.broadcast_to(truth_of(data) & np.equal(status, DEFINED), get.size)
         return GroupEvaluation(holds.tolist(), [False] * get.size, {})

@@ -1,4 +1,4 @@
-"""Conditions on label objects without a role, of many labels at once: told as by a search for each label."""
+"""Conditions on what is observed, of many labels at once: told as by a search for each label."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.dataset import open_dataset
 
 HEAD = (
-    "model scenic.domains.driving.model\nfrom scenicq.labels import along, count, nearest, others\n"
+    "model scenic.domains.driving.model\nfrom scenicq.labels import along, beside, box_distance, count, nearest, others\n"
     "ego = new Car on road, facing Range(-180, 180) deg\n"
 )
 LEAD = "lead = new Car on road, facing Range(-180, 180) deg\n"
@@ -27,6 +27,11 @@ PROGRAMS = {
     "not the first": f"{LEAD}require any((distance to c) < (distance to lead) for c in others(Car))",
     "two roles": f"{LEAD}{WALKER}require len([c for c in others(Object) if (distance from c to walker) < 20]) != 1",
     "on the course": "require any(0 < along(ego, c) < 30 for c in others(Car))",
+    "ahead on the course": f"{LEAD}require 0 < along(ego, lead) < 40 and abs(beside(ego, lead)) < 4",
+    "not on the course": f"{LEAD}require not (0 < along(ego, lead) < 40)",
+    "the nearest ahead": f"{LEAD}require lead is nearest(Car, ahead=True)",
+    "between boxes": f"{LEAD}require box_distance(ego, lead) < 12 or lead.speed > 3",
+    "with a parameter": f"param limit = 5\n{LEAD}require along(ego, lead) > 5 or beside(lead, ego) > 1",
     "motion": "require all(c.speed < 9 for c in others(Object))",
     "together": f"{LEAD}require (distance to lead) < 25 or count(Car) > 2",
 }
@@ -45,9 +50,9 @@ def told(dataset, text: str, classes: str) -> list[object]:
 def test_labels_side_by_side_are_told_as_each_alone(crossroads, monkeypatch, name):
     dataset, classes = open_dataset(crossroads), "coarse" if name == "how many" else "fine"
     together = told(dataset, PROGRAMS[name], classes)
-    monkeypatch.setattr(first_fit, "others_form_of", lambda group: None)
+    monkeypatch.setattr(first_fit, "observed_form_of", lambda group: None)
     assert together == told(dataset, PROGRAMS[name], classes)
-    assert {type(verdict) for _, verdict in together} != {Match} or name in ("motion", "nobody near")
+    assert {type(verdict) for _, verdict in together} != {Match} or name in ("motion", "nobody near", "not on the course")
 
 
 def test_what_surely_holds_needs_no_search(crossroads, monkeypatch):
