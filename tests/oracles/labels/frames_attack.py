@@ -114,15 +114,20 @@ def _results(dataset: Dataset, text: str, options: QueryOptions) -> list[Result]
         return []  # no label matches
 
 
-def all_answers(dataset: Dataset, text: str, roles: Sequence[str]) -> dict[str, set[Correspondence]]:
-    """All correspondences by which each frame matches, in the order of the roles but the ego."""
+def all_answers(
+    dataset: Dataset, text: str, roles: Sequence[str]
+) -> tuple[dict[str, set[Correspondence]], frozenset[str]]:
+    """All correspondences by which each frame matches, in the order of the roles but the ego; what is left open."""
     found: dict[str, set[Correspondence]] = {}
+    open_: set[str] = set()
     for result in _results(dataset, text, replace(_USUAL, all_matches=True)):
         if isinstance(result.verdict, Match):
             one = tuple(int(result.verdict.correspondence[role][1:]) for role in roles)
             assert one not in found.setdefault(result.frame, set()), (result.frame, one)
             found[result.frame].add(one)
-    return found
+        elif isinstance(result.verdict, Unknown):
+            open_.add(result.frame)
+    return found, frozenset(open_)
 
 
 def asked_answers(dataset: Dataset, text: str, words: Sequence[str]) -> tuple[dict[str, bool | None], Counter[str]]:
@@ -179,9 +184,12 @@ def _wrong_correspondences(
 ) -> list[str]:
     """The frames of which not all is told by which they match, or something else."""
     told: list[str] = []
-    found = all_answers(dataset, program.text, [role.name for role in program.roles[1:]])
+    found, left = all_answers(dataset, program.text, [role.name for role in program.roles[1:]])
     for number, scene in enumerate(scenes):
         mine = found.get(f"f{number:03}", set())
+        if f"f{number:03}" in left:
+            counts[f"{ALL}: unknown"] += 1
+            continue
         if right[number] in ({True}, {False}):
             counts[f"{ALL}: {'match' if mine else 'no match'}"] += 1
             if wrong := wrong_correspondences(program, scene, mine):
