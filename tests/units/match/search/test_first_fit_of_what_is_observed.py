@@ -52,7 +52,11 @@ def test_labels_side_by_side_are_told_as_each_alone(crossroads, monkeypatch, nam
     together = told(dataset, PROGRAMS[name], classes)
     monkeypatch.setattr(first_fit, "observed_form_of", lambda group: None)
     assert together == told(dataset, PROGRAMS[name], classes)
-    assert {type(verdict) for _, verdict in together} != {Match} or name in ("motion", "nobody near", "not on the course")
+    assert {type(verdict) for _, verdict in together} != {Match} or name in (
+        "motion",
+        "nobody near",
+        "not on the course",
+    )
 
 
 def test_what_surely_holds_needs_no_search(crossroads, monkeypatch):
