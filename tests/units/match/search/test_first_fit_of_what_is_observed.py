@@ -14,7 +14,8 @@ from scenicq.query.execution.run import Query, QueryOptions
 from scenicq.store.dataset import open_dataset
 
 HEAD = (
-    "model scenic.domains.driving.model\nfrom scenicq.labels import along, beside, box_distance, count, nearest, others\n"
+    "model scenic.domains.driving.model\n"
+    "from scenicq.labels import along, beside, box_distance, count, nearest, others\n"
     "ego = new Car on road, facing Range(-180, 180) deg\n"
 )
 LEAD = "lead = new Car on road, facing Range(-180, 180) deg\n"
