@@ -160,7 +160,8 @@ def _read(part: Node, scenario: Scenario, classes: Granularity, *, proving: bool
         return None
     every, given = node.op is AmongOp.EVERY, node.inputs[node.excluded :]
     spoken = {index for index, _ in features(*given)} - {ego}
-    if len(spoken) > 1 or (every and negated):
+    # parameters are none of the columns
+    if len(spoken) > 1 or min(spoken, default=0) < 0 or (every and negated):
         return None
     role = next(iter(spoken), None)
     columns = {(ELEMENT, name): column for name, column in object_columns(OTHER).items()}
@@ -187,7 +188,8 @@ def _read(part: Node, scenario: Scenario, classes: Granularity, *, proving: bool
     bounds = SqlBounds({**columns, **said_columns((body,), said, columns)})
     parts = [] if every else list(conjuncts(body))
     own = [each for each in parts if _is_same(each, role, CompareOp.EQ)]
-    if own and not negated and node.number == 1:
+    excluded = {each.object for each in node.inputs[: node.excluded] if isinstance(each, Feature)}
+    if own and not negated and node.number == 1 and role not in excluded:
         asked = _of_role(connect(LogicOp.AND, [each for each in parts if each not in own]), role)
         holds = SQL.negation(bounds.can_fail(asked)) if proving else bounds.can_hold(asked)
         of_class = _of_class(node.category, classes, 2 if proving else 1, "a")
@@ -196,7 +198,6 @@ def _read(part: Node, scenario: Scenario, classes: Granularity, *, proving: bool
     if apart:
         body = connect(LogicOp.AND, [each for each in parts if each not in apart])
     # of those who are all that is known is that some may play a role
-    excluded = {each.object for each in node.inputs[: node.excluded] if isinstance(each, Feature)}
     roles = node.excluded - 1 - (role in excluded)
     few = negated or every
     if few == proving:

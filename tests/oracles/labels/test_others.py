@@ -100,7 +100,15 @@ class OfOne:
 def of_one(draw: random.Random, name: str, roles: list[str], depth: int = 1) -> OfOne:
     limit = draw.randint(2, 14) + 0.3
     role = draw.choice(roles)
-    match draw.choice(["near", "near", "side", "heading", "speed", "not", "and", "farther", "said", "said"]):
+    match draw.choice(["near", "near", "side", "heading", "speed", "not", "and", "farther", "said", "said", "who"]):
+        case "who":
+            word = draw.choice(["is", "is not"])
+
+            def who(w: World, c: LabelObject) -> Truth:
+                mine = w.roles[role]
+                return None if mine is None else (c.id == mine.id) == (word == "is")
+
+            return OfOne(f"{name} {word} {role}", who)
         case "said":
             text, holds = of_attribute(draw, name)
             return OfOne(text, lambda w, c: holds(c))

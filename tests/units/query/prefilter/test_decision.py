@@ -169,6 +169,33 @@ TO_A_ROLE = {
 }
 
 
+ODD = [
+    "any(c is other for c in others(Car))",
+    "any(c is other and (distance to c) < 40 for c in others(Car))",
+    "not any(c is other for c in others(Car))",
+    "any((distance from c to other) < globalParameters.far for c in others(Car))",
+    "not any(c is not other and (distance to c) < (distance to other) for c in others(Object))",
+    "other is not nearest(Car)",
+    "other is nearest(Car) or (distance to other) > 20",
+]
+
+
+@pytest.mark.parametrize("condition", ODD)
+@pytest.mark.one_in(3)
+def test_without_proofs_odd_conditions_on_a_role_find_the_same_frames(dataset, condition):
+    text = (
+        "from scenicq.labels import nearest, others\nparam far = 9\nego = new Car\n"
+        f"other = new Car in everywhere, facing Range(0, 360) deg\nrequire {condition}"
+    )
+    options = MatchOptions(ignore_params=frozenset({"far"}))
+    found = [
+        [each.frame for each in Query(dataset, Source("t", HEADER + text), QueryOptions(options, **how)).results()
+         if isinstance(each.verdict, Match)]
+        for how in ({"proofs": False}, {"prefilter": False})
+    ]  # fmt: skip
+    assert found[0] == found[1]
+
+
 @pytest.mark.parametrize("name", list(TO_A_ROLE))
 @pytest.mark.one_in(4)
 def test_sql_decides_what_others_are_to_a_role(dataset, name):
