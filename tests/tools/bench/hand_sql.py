@@ -386,7 +386,7 @@ SELECT frame FROM ego WHERE frame NOT IN (
         "lead = new Truck in everywhere, facing Range(-180, 180) deg\nrequire lead is nearest(Truck, ahead=True)",
         """
 SELECT DISTINCT a.frame FROM objects a JOIN ego USING (frame)
-WHERE a.class = 'Truck' AND a.ego_distance <= 50 AND a.ego_along - a.ego_along_less > 0
+WHERE a.class = 'Truck' AND a.ego_along - a.ego_along_less > 0
 AND NOT EXISTS (
     SELECT 1 FROM objects b WHERE b.frame = a.frame AND b.class = 'Truck' AND b.ego_distance < a.ego_distance
     AND coalesce(b.ego_along + b.ego_along_more > 0, true))""",
