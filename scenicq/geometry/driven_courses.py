@@ -165,14 +165,14 @@ class CourseLine:
         known = {each: self._known[each] for each in asked if each in self._known}
         new = [each for each in dict.fromkeys(asked) if each not in known]
         if new:
-            if len(self._known) + len(new) > _KNOWN:
-                self._known.clear()
             numbers = np.array(new)
             ends, extended = _of_line(self, numbers[:, :3], numbers[:, 3:])
             rows: list[list[float]] = np.column_stack((ends, extended)).tolist()
             found = {each: (*row,) for each, row in zip(new, rows, strict=True)}
             known |= found
             if len(new) <= _KNOWN:
+                if len(self._known) + len(new) > _KNOWN:
+                    self._known.clear()
                 self._known |= found
         return [known[each] for each in asked]
 

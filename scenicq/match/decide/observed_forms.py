@@ -11,7 +11,7 @@ from typing import cast
 import numpy as np
 
 from scenicq.errors import CannotEvaluate
-from scenicq.forest.among import LABEL_OBJECTS, LabelElements, among_column, asks_others
+from scenicq.forest.among import LABEL_OBJECTS, LabelElements, among_column
 from scenicq.forest.clear_columns import ClearColumns
 from scenicq.forest.column_domain import first_direction
 from scenicq.forest.columns import DEFINED, Column, Data, constant_column, truth_of
@@ -42,7 +42,6 @@ def observed_form_of(group: Group) -> ClosedForm | None:
     (item,) = constraints
     if not isinstance(item, Condition):
         return None
-    others = asks_others(item.expression)
     nodes = list(postorder((item.expression,)))
     # where several directions are allowed, any of them will do
     if any(is_leaf(node) or isinstance(node, DirectionAt) for node in nodes):
@@ -68,7 +67,7 @@ def observed_form_of(group: Group) -> ClosedForm | None:
         def drawn(*_: object) -> Column:
             raise CannotEvaluate("a random variable")
 
-        domain = ClearColumns(observed, drawn, first_direction, others=among if others else None)
+        domain = ClearColumns(observed, drawn, first_direction, others=among)
         data, status = interpret(steps, domain, known)[id(item.expression)]
         holds = np.broadcast_to(truth_of(data) & np.equal(status, DEFINED), get.size)
         return GroupEvaluation(holds.tolist(), [False] * get.size, {})

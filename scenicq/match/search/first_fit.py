@@ -80,8 +80,8 @@ class LabelRow:
                 seen = self.seen[number] = {**seen, COURSE: course}
         return seen
 
-    def observed_beside(self, number: int) -> Mapping[str, Value]:
-        """What is observed of a label object that need not play a role, without its course: that takes long."""
+    def observe_without_course(self, number: int) -> Mapping[str, Value]:
+        """What is observed of a label object that need not play a role; its course would take long to make."""
         seen = self.seen.get(number)
         return observe(_label_object(self.label, number)) if seen is None else seen
 
@@ -378,9 +378,12 @@ def _column(
         name: The property.
     """
     if (index, name) == LABEL_OBJECTS:
-        some = functools.partial(
-            elements_of, [row.label for row in rows], lambda place, number: rows[place].observed_beside(number)
-        )
+
+        @functools.cache  # each property is asked of each of them
+        def seen(place: int, number: int) -> Mapping[str, Value]:
+            return rows[place].observe_without_course(number)
+
+        some = functools.partial(elements_of, [row.label for row in rows], seen)
         return cast(FloatColumn, functools.cache(some))
     rank = ranks[index]
     if name in WHO:

@@ -165,7 +165,7 @@ def show_bands(bands: Sequence[Band]) -> list[str]:
 
 
 def shorten(text: str, letters: int = 48) -> str:
-    """Cut a text to so many letters, by default those that a name in a line may have."""
+    """Cut a text to a number of letters; by default, to those that a line has room for."""
     return text if len(text) <= letters else f"{text[: letters - 1]}\N{HORIZONTAL ELLIPSIS}"
 
 

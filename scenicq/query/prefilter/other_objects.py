@@ -51,19 +51,30 @@ OTHER = "o"
 
 @dataclass(frozen=True, slots=True)
 class OtherCondition:
-    """What a frame must have, or must not.
+    """What the label objects of a frame must be, or must not.
 
     Attributes:
-        counted: SQL that is true of each label object `o` that counts, over its columns and the ego's.
+        role: The role that it is about besides; None for the frame alone.
+        counted: SQL that is true of each label object `o` that counts, over its columns and the ego's, and over those
+            of whoever plays the role, `a`.
         at_least: How many there must be; None where they must be few.
         most: How many there may be; of no meaning where `at_least` is given.
         span: Where the program says it.
     """
 
+    role: int | None
     counted: str
-    at_least: int | None
-    most: int
-    span: Span | None
+    at_least: int | None = None
+    most: int = 0
+    span: Span | None = None
+
+    @property
+    def as_column_condition(self) -> ColumnCondition:
+        """The condition on the frame, or on its object in the role."""
+        objects = () if self.role is None else (self.role,)
+        limit = f"<= {self.most}" if self.at_least is None else f">= {self.at_least}"
+        among = f"FROM {OBJECTS} {OTHER} WHERE {OTHER}.frame = {EGO}.frame AND {self.counted}"
+        return ColumnCondition(objects, f"(SELECT count(*) {among}) {limit}")
 
 
 def other_conditions(scenario: Scenario, classes: Granularity) -> Iterator[OtherCondition]:
@@ -76,8 +87,8 @@ def other_conditions(scenario: Scenario, classes: Granularity) -> Iterator[Other
     for requirement in scenario.requirements:
         for part in conditions_of(requirement.condition):
             found = _read(part, scenario, classes, proving=False)
-            if found is not None and found.role is None:
-                yield OtherCondition(found.counted, found.at_least, found.most, requirement.span)
+            if isinstance(found, OtherCondition) and found.role is None:
+                yield replace(found, span=requirement.span)
 
 
 def role_conditions(root: Node, scenario: Scenario, classes: Granularity) -> Iterator[ColumnCondition]:
@@ -90,8 +101,10 @@ def role_conditions(root: Node, scenario: Scenario, classes: Granularity) -> Ite
     """
     for part in conditions_of(root):
         found = _read(part, scenario, classes, proving=False)
-        if found is not None and found.role is not None:
-            yield found.of_role
+        if isinstance(found, ColumnCondition):
+            yield found
+        elif found is not None and found.role is not None:
+            yield found.as_column_condition
 
 
 def proof(part: Node, scenario: Scenario, classes: Granularity) -> ColumnCondition | None:
@@ -103,7 +116,7 @@ def proof(part: Node, scenario: Scenario, classes: Granularity) -> ColumnConditi
         classes: How classes are compared.
     """
     found = _read(part, scenario, classes, proving=True)
-    return None if found is None else found.of_role
+    return found.as_column_condition if isinstance(found, OtherCondition) else found
 
 
 def conditions_of(root: Node) -> Iterator[Node]:
@@ -121,38 +134,10 @@ def conditions_of(root: Node) -> Iterator[Node]:
                     yield part
 
 
-@dataclass(frozen=True, slots=True)
-class _Reading:
-    """What SQL says of the label objects of a frame.
-
-    Attributes:
-        role: The role that it is about besides; None for the frame alone.
-        counted: SQL that is true of each label object `o` that counts, and of whoever plays the role, `a`; where nobody
-            is counted, of the role alone.
-        at_least: How many there must be, None where they must be few.
-        most: How many there may be.
-        counts: Whether label objects are counted.
-    """
-
-    role: int | None
-    counted: str
-    at_least: int | None = None
-    most: int = 0
-    counts: bool = True
-
-    @property
-    def of_role(self) -> ColumnCondition:
-        """As a condition on the frame, or on its object in the role."""
-        objects = () if self.role is None else (self.role,)
-        if not self.counts:
-            return ColumnCondition(objects, self.counted)
-        limit = f"<= {self.most}" if self.at_least is None else f">= {self.at_least}"
-        among = f"FROM {OBJECTS} {OTHER} WHERE {OTHER}.frame = {EGO}.frame AND {self.counted}"
-        return ColumnCondition(objects, f"(SELECT count(*) {among}) {limit}")
-
-
-def _read(part: Node, scenario: Scenario, classes: Granularity, *, proving: bool) -> _Reading | None:
-    """What a condition says; None where SQL cannot tell."""
+def _read(
+    part: Node, scenario: Scenario, classes: Granularity, *, proving: bool
+) -> OtherCondition | ColumnCondition | None:
+    """What a condition says of label objects, or of a role alone; None where SQL cannot tell."""
     ego = scenario.ego
     negated = isinstance(part, Logic) and part.op is LogicOp.NOT
     node = part.args[0] if isinstance(part, Logic) and negated else part
@@ -189,11 +174,11 @@ def _read(part: Node, scenario: Scenario, classes: Granularity, *, proving: bool
     parts = [] if every else list(conjuncts(body))
     own = [each for each in parts if _is_same(each, role, CompareOp.EQ)]
     excluded = {each.object for each in node.inputs[: node.excluded] if isinstance(each, Feature)}
-    if own and not negated and node.number == 1 and role not in excluded:
+    if role is not None and own and not negated and node.number == 1 and role not in excluded:
         asked = _of_role(connect(LogicOp.AND, [each for each in parts if each not in own]), role)
         holds = SQL.negation(bounds.can_fail(asked)) if proving else bounds.can_hold(asked)
         of_class = _of_class(node.category, classes, 2 if proving else 1, "a")
-        return _Reading(role, _and(of_class, holds, unknown=not proving), counts=False)
+        return ColumnCondition((role,), _and(of_class, holds, unknown=not proving))
     apart = [each for each in parts if _is_same(each, role, CompareOp.NE)]
     if apart:
         body = connect(LogicOp.AND, [each for each in parts if each not in apart])
@@ -211,17 +196,15 @@ def _read(part: Node, scenario: Scenario, classes: Granularity, *, proving: bool
         counted = f"({counted} AND {OTHER}.number <> a.number)"
     least = 1 if every else node.number
     if few:
-        return _Reading(role, counted, most=least - 1 + (0 if proving else roles))
-    return _Reading(role, counted, least + (roles if proving else 0))
+        return OtherCondition(role, counted, most=least - 1 + (0 if proving else roles))
+    return OtherCondition(role, counted, least + (roles if proving else 0))
 
 
-def _of_role(root: Node, role: int | None) -> Node:
+def _of_role(root: Node, role: int) -> Node:
     """What a condition on a label object says of the one that plays a role."""
 
     def of_role(node: Node) -> Node:
-        if role is not None and isinstance(node, Feature) and node.object == ELEMENT:
-            return replace(node, object=role)
-        return node
+        return replace(node, object=role) if isinstance(node, Feature) and node.object == ELEMENT else node
 
     return transform(root, of_role)
 
