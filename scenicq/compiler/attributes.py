@@ -218,7 +218,8 @@ def _of_instance(run: Interpreter, value: Instance, name: str, span: Span) -> Mo
     if name == "visibleRegion":
         return operators.visible_region(value, span)
     if name == "canSee":
-        return Builtin(name, lambda span, other, occludingObjects=(), debug=False: operators.can_see(value, other, span))
+        # what is given besides says what hides things, and here nothing does
+        return Builtin(name, lambda span, other, *_, **__: operators.can_see(value, other, span))
     if value.index is not None and (name in _OF_BOXES or (name == "distanceTo" and run.version == 3)):
         return REGION_METHODS[name](operators.object_box(value, span))
     if name == "distanceTo":

@@ -279,7 +279,8 @@ class TogetherFrame:
 
 
 ProcessFrame: TypeAlias = (
-    "BlockFrame | WhileFrame | ForFrame | CallFrame | LibraryFrame | TryFrame | ExceptFrame | FinalFrame | TogetherFrame"
+    "BlockFrame | WhileFrame | ForFrame | CallFrame | LibraryFrame"
+    " | TryFrame | ExceptFrame | FinalFrame | TogetherFrame"
 )
 
 

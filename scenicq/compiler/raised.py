@@ -74,7 +74,7 @@ def _name(node: ast.Expression, scope: Environment) -> str:
     while isinstance(root, ast.Attribute):
         root = root.value
     if not isinstance(root, ast.Name):
-        raise fail("unsupported-construct", "this is not supported after `except`", node.span, "no name of an exception",
+        raise fail("unsupported-construct", "this is not supported after `except`", node.span, "not a name",
                    ("write the name of an exception, or several in brackets",))  # fmt: skip
     if scope.find(root.id) is not None:
         return ""

@@ -80,9 +80,13 @@ def random_body(draw: random.Random, names: list[str], depth: int, *, loop: bool
     found: Body = []
     atom = lambda: draw.randrange(ATOMS)  # noqa: E731
     words = ["wait", "take", "flag", "if flag", "require", "terminate", "for", "until"]
-    words += ["if", "while", "try", "try", "catch", "catch"] * bool(depth) + ["do", "do until", "do for", "choose", "shuffle"] * bool(
-        names
-    )
+    words += ["if", "while", "try", "try", "catch", "catch"] * bool(depth) + [
+        "do",
+        "do until",
+        "do for",
+        "choose",
+        "shuffle",
+    ] * bool(names)
     words += ["break"] * loop + ["abort", "abort"] * inside + ["return"]
     for _ in range(draw.randint(1, 3)):
         word = draw.choice(words)
