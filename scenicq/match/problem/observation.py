@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from functools import lru_cache
+from functools import lru_cache, partial
 
 from scenicq.forest.nodes import COURSE, GOING, LAST_LANE, LaneCourse, Value
 from scenicq.forest.scenario import Scenario
-from scenicq.geometry.driven_courses import CoursePlace
+from scenicq.geometry.driven_courses import GAP_S, CoursePlace, StoredCourse
 from scenicq.store.labels import Label, LabelObject
 from scenicq.store.recorded_tracks import EGO
 
@@ -64,7 +64,11 @@ def observe_course(label: Label, label_object: LabelObject, rules: LaneCourse) -
         return None
     track = EGO if label_object is label.ego else None if label_object.track is None else ("track", label_object.track)
     place = (label_object.x, label_object.y, label_object.heading)
-    return label.recorded.course(rules.network, rules.gap_s, label.recording, label.frame, track, place)
+    make = partial(label.recorded.course, rules.network, rules.gap_s, label.recording, label.frame, track, place)
+    if label_object is not label.ego or rules.gap_s != GAP_S:
+        return make()
+    known = {(each.x, each.y): each.on_ego_course for each in label.objects if each.on_ego_course is not None}
+    return StoredCourse(known, make) if known else make()
 
 
 def observed_names(label_object: LabelObject) -> frozenset[str]:
