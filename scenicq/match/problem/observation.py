@@ -8,11 +8,14 @@ from functools import lru_cache, partial
 
 from scenicq.forest.nodes import COURSE, GOING, LAST_LANE, LaneCourse, Value
 from scenicq.forest.scenario import Scenario
-from scenicq.geometry.driven_courses import GAP_S, CoursePlace, StoredCourse
+from scenicq.geometry.driven_courses import GAP_S, CoursePlace, StoredCourse, lane_course
 from scenicq.store.labels import Label, LabelObject
 from scenicq.store.recorded_tracks import EGO
 
-__all__ = ["IN_COLUMNS", "course_rules", "observe", "observe_course", "observe_params", "observed_names"]
+__all__ = [
+    "IN_COLUMNS", "course_rules", "course_without_role", "observe", "observe_course", "observe_params",
+    "observed_names",
+]  # fmt: skip
 
 IN_COLUMNS = frozenset({
     "position", "heading", "width", "length", "height", "velocity", "speed", "acceleration", "angularSpeed", COURSE,
@@ -69,6 +72,17 @@ def observe_course(label: Label, label_object: LabelObject, rules: LaneCourse) -
         return make()
     known = {(each.x, each.y): each.on_ego_course for each in label.objects if each.on_ego_course is not None}
     return StoredCourse(known, make) if known else make()
+
+
+def course_without_role(label: Label, label_object: LabelObject, rules: LaneCourse | None) -> CoursePlace | None:
+    """The course of a label object that need not play a role; None where the scenario asks for none.
+
+    Where nothing but the label itself is known, it is that of the lane, as of what is seen once.
+    """
+    if rules is None:
+        return None
+    found = observe_course(label, label_object, rules)
+    return found or lane_course(rules.network, label_object.x, label_object.y, label_object.heading)
 
 
 def observed_names(label_object: LabelObject) -> frozenset[str]:

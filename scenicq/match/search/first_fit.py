@@ -36,7 +36,7 @@ from scenicq.match.problem.candidates import Candidates
 from scenicq.match.problem.constraints import Signature
 from scenicq.match.problem.label_elements import elements_of
 from scenicq.match.problem.map_lookups import MapLookups
-from scenicq.match.problem.observation import observe, observe_course, observed_names
+from scenicq.match.problem.observation import course_without_role, observe, observe_course, observed_names
 from scenicq.match.problem.outcome import Outcome
 from scenicq.match.search.group_plan import GroupPlan, MatchPlan
 from scenicq.store.labels import Label, LabelObject
@@ -86,6 +86,11 @@ class LabelRow:
         """What is observed of a label object that need not play a role; its course would take long to make."""
         seen = self.seen.get(number)
         return observe(_label_object(self.label, number)) if seen is None else seen
+
+    def course(self, number: int) -> Value:
+        """The course of a label object that need not play a role."""
+        known = self.seen.get(number, {}).get(COURSE)
+        return known or course_without_role(self.label, _label_object(self.label, number), self.courses)
 
 
 @dataclass(frozen=True, slots=True)
@@ -470,7 +475,10 @@ def _column(
         def seen(place: int, number: int) -> Mapping[str, Value]:
             return rows[place].observe_without_course(number)
 
-        some = functools.partial(elements_of, [row.label for row in rows], seen)
+        def course(place: int, number: int) -> Value:
+            return rows[place].course(number)
+
+        some = functools.partial(elements_of, [row.label for row in rows], seen, course)
         return cast(FloatColumn, functools.cache(some))
     rank = ranks[index]
     if name in WHO:

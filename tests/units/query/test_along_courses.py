@@ -214,20 +214,32 @@ ASKED = {
 def test_of_others_as_much_is_known_as_of_roles(drawn: Drawn, form: str) -> None:
     head = HEAD.replace("along,", "along, others,").split("\nc = ")[0]
     for condition in CONDITIONS:
-        if "along(c" in condition:
-            continue  # what is no role has no course
         found = _found(drawn.dataset, f"{head}\nrequire {ASKED[form].format(condition)}\n")
         for frame, truth in drawn.truths(condition).items():
             assert found.get(frame, False) is truth, (condition, frame, drawn.frames[frame])
 
 
+@pytest.mark.parametrize("condition", ["0 < along(ego, c) < 20", "5 < along(c, ego)"])
+@pytest.mark.one_in(2)
 @pytest.mark.slow
-def test_of_others_as_much_is_known_over_time(drawn: Drawn) -> None:
+def test_of_others_as_much_is_known_over_time(drawn: Drawn, condition: str) -> None:
     head = HEAD.replace("along,", "along, others,").split("\nc = ")[0]
-    text = f"{head}\nrequire always any(0 < along(ego, c) < 20 for c in others(Object))\n"
+    text = f"{head}\nrequire always any({condition} for c in others(Object))\n"
     found = _found(drawn.dataset, text, time=IntervalOptions(intervals="all"))
-    for frame, truth in drawn.truths("0 < along(ego, c) < 20").items():
+    for frame, truth in drawn.truths(condition).items():
         assert (found.get(frame) is True) == (truth is True)
+
+
+def test_a_label_from_no_store_has_the_courses_of_its_lanes() -> None:
+    head = HEAD.replace("along,", "along, others,").split("\nc = ")[0]
+    text = (
+        "model scenic.domains.driving.model\n" + head + "\nrequire any(5 < along(c, ego) < 9 for c in others(Object))\n"
+    )
+    matcher = Matcher(compile_scenario(Source("p.scenic", text), street()))
+    ego = LabelObject("ego", "Car", "car", 2.0, 17.0, 0.0)
+    for y, holds in ((10.0, True), (11.9, True), (12.1, False), (24.0, False)):
+        label = Label("f", "r", 0, "street", ego, (LabelObject("o", "Car", "car", 2.0, y, 0.0),))
+        assert isinstance(matcher.match(label), Match) is holds, y
 
 
 @pytest.mark.parametrize("method", ["smt", "monolithic"])
