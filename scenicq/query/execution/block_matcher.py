@@ -18,11 +18,12 @@ from scenicq.forest.unobserved import MOTION
 from scenicq.geometry.network import Network
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.constraints import relevant_properties
-from scenicq.match.verdict import Match, Verdict
+from scenicq.match.problem.outcome import UNOBSERVED as REASON
+from scenicq.match.verdict import Cause, Match, Unknown, Verdict
 from scenicq.query.execution.lazy_solver import LazySolver
 from scenicq.query.execution.results import Result
 from scenicq.query.prefilter.condition_reader import course_column
-from scenicq.query.prefilter.decision import decided_frames
+from scenicq.query.prefilter.decision import MATCHING, UNOBSERVED, decided_frames
 from scenicq.query.prefilter.executor import Block, keep_players, names, object_rows, run_players, run_prefilter
 from scenicq.query.prefilter.plan import LABELS, Plan, make_plan
 from scenicq.query.prefilter.survivors import Candidate, CandidateRows, candidate_rows, candidates
@@ -221,13 +222,14 @@ class Decider:
         return BlockOutcome(missed, self._matched(self._left(compiled)), named)
 
     def _partly_decided(self, compiled: CompiledMap) -> Iterator[list[Result]]:
-        """The results of the frames that the prefilter has left, where SQL says that some surely match."""
+        """The results of the frames that the prefilter has left, where SQL tells some of them."""
         rows = decided_frames(self.connection, compiled.plan.decision, LABELS, compiled.plan.left)
-        open_ = np.array([number for number, sure, *_ in rows if not sure], dtype=np.int64)
-        asked = self._matched(self._left(compiled, open_) if len(open_) else iter(()))
-        proved, none = Match({}, {}), dict[str, str]()
-        for _, sure, frame, recording, time in rows:
-            yield [Result(frame, recording, time, proved, none)] if sure else next(asked)
+        left = np.array([number for number, told, *_ in rows if not told], dtype=np.int64)
+        asked = self._matched(self._left(compiled, left) if len(left) else iter(()))
+        verdicts: dict[int, Verdict] = {MATCHING: Match({}, {}), UNOBSERVED: Unknown(REASON, Cause(""))}
+        none = dict[str, str]()
+        for _, told, frame, recording, time in rows:
+            yield [Result(frame, recording, time, verdicts[told], none)] if told else next(asked)
 
     def _left(self, compiled: CompiledMap, among: NDArray[np.int64] | None = None) -> Iterator[Candidate]:
         """The labels that the prefilter has left, with as much of each as the matcher looks at."""
