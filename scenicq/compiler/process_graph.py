@@ -46,7 +46,7 @@ from scenicq.compiler.process_states import (
     PickBehavior,
     ProcessFrame,
     ProcessState,
-    Raise,
+    RaiseAgain,
     TimerStarts,
     TogetherFrame,
     TryFrame,
@@ -319,7 +319,7 @@ class ProcessGraph:
             frame = state.frames[at]
             below = replace(state, frames=state.frames[:at], resumed=-1, asked=-1, guards=(), of=-1)
             if isinstance(frame, FinalFrame):
-                return self.push(below, BlockFrame((*frame.body, Raise(raised, span))))
+                return self.push(below, BlockFrame((*frame.body, RaiseAgain(raised, span))))
             caught = [each for each in frame.handlers if each.catches(raised)] if isinstance(frame, ExceptFrame) else []
             if caught:
                 handler = caught[0]
@@ -645,7 +645,7 @@ class ProcessGraph:
                 raise self.refusal(node.span)
             case ast.Try() | ast.TryInterrupt():
                 return self.attempt(state, node, rest)
-            case Raise():
+            case RaiseAgain():
                 return self.raise_at(rest, node.raised, node.span)
             case ast.Require(probability=None):
                 broken = self.raise_at(rest, "RejectSimulationException", node.span)

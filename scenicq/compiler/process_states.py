@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 from scenicq.compiler.coroutines import CoroutineCall
 from scenicq.compiler.local_values import VariableValue
-from scenicq.compiler.raised import Handler
+from scenicq.compiler.raised import ExceptClause
 from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.forest.nodes import Node
@@ -49,7 +49,7 @@ __all__ = [
     "PickBehavior",
     "ProcessFrame",
     "ProcessState",
-    "Raise",
+    "RaiseAgain",
     "RunningScenario",
     "ScenarioStep",
     "TimerStarts",
@@ -107,7 +107,7 @@ class Idle:
 
 
 @dataclass(frozen=True, slots=True)
-class Raise:
+class RaiseAgain:
     """Raises something again, after a `finally`.
 
     Attributes:
@@ -135,7 +135,7 @@ class EnterScenarios:
 
 
 GraphStatement: TypeAlias = (
-    "ast.Statement | AskInvariants | BeginBehavior | PickBehavior | Idle | Raise | EnterScenarios"
+    "ast.Statement | AskInvariants | BeginBehavior | PickBehavior | Idle | RaiseAgain | EnterScenarios"
 )
 
 
@@ -230,7 +230,7 @@ class ExceptFrame:
         orelse: What is done where nothing was raised.
     """
 
-    handlers: tuple[Handler, ...]
+    handlers: tuple[ExceptClause, ...]
     orelse: tuple[ast.Statement, ...]
 
 
@@ -279,8 +279,7 @@ class TogetherFrame:
 
 
 ProcessFrame: TypeAlias = (
-    "BlockFrame | WhileFrame | ForFrame | CallFrame | LibraryFrame"
-    " | TryFrame | ExceptFrame | FinalFrame | TogetherFrame"
+    BlockFrame | WhileFrame | ForFrame | CallFrame | LibraryFrame | TryFrame | ExceptFrame | FinalFrame | TogetherFrame
 )
 
 

@@ -14,7 +14,7 @@ from scenicq.compiler.values import fail
 from scenicq.errors import similar
 from scenicq.syntax import ast
 
-__all__ = ["Handler", "read_handlers", "violation"]
+__all__ = ["ExceptClause", "read_handlers", "violation"]
 
 _BUILTIN = frozenset(
     name for name, value in vars(builtins).items() if isinstance(value, type) and issubclass(value, BaseException)
@@ -31,7 +31,7 @@ _SCENIC = frozenset(("GuardViolation", *_ABOVE)) - _BUILTIN
 
 
 @dataclass(frozen=True, slots=True)
-class Handler:
+class ExceptClause:
     """An `except`.
 
     Attributes:
@@ -54,17 +54,17 @@ def violation(guard: ast.DynamicStatement) -> str:
     return "PreconditionViolation" if guard.kind == "precondition" else "InvariantViolation"
 
 
-def read_handlers(handlers: tuple[ast.ExceptHandler, ...], scope: Environment) -> tuple[Handler, ...]:
+def read_handlers(handlers: tuple[ast.ExceptHandler, ...], scope: Environment) -> tuple[ExceptClause, ...]:
     """The handlers of a `try`, in their order.
 
     Raises:
         ScenarioError: unknown-name; unsupported-construct, for what is no name of an exception.
     """
-    found: list[Handler] = []
+    found: list[ExceptClause] = []
     for each in handlers:
         types = each.type.items if isinstance(each.type, ast.Tuple) else (each.type,)
         names = frozenset(_name(one, scope) for one in types if one is not None)
-        found.append(Handler(names if each.type is not None else None, each.name, each.body))
+        found.append(ExceptClause(names if each.type is not None else None, each.name, each.body))
     return tuple(found)
 
 
