@@ -206,10 +206,16 @@ def _meant_elements(group: Group, ego: int, along: Comparison | None) -> MeantEl
         return None
     objects = {each.object for each in found}
     alike = all(each.occupancy is found[0].occupancy for each in found)
+    ranks = min(each.ranks for each in found) if asking <= 1 else 1
     if not alike or ego not in objects or len(objects) != 1 + len(equations):
-        return MeantElements(None, 1)
+        # which of those at each place is meant matters where more is asked of it than that it is there
+        more = any(
+            numbers != some or not any(one.is_same(place) for places in equations for place in places)
+            for one, numbers in allowed
+        )
+        return MeantElements(None, 1 if more else ranks)
     among = frozenset(range(found[0].occupancy.nothing)).intersection(*(numbers for _, numbers in allowed))
-    return MeantElements(among, min(each.ranks for each in found) if asking <= 1 else 1, shared=bool(equations))
+    return MeantElements(among, ranks, shared=bool(equations))
 
 
 def _looks_up(node: Node) -> bool:
