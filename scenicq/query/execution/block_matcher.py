@@ -21,6 +21,7 @@ from scenicq.match.problem.constraints import relevant_properties
 from scenicq.match.verdict import Match, Verdict
 from scenicq.query.execution.lazy_solver import LazySolver
 from scenicq.query.execution.results import Result
+from scenicq.query.prefilter.condition_reader import course_column
 from scenicq.query.prefilter.decision import decided_frames
 from scenicq.query.prefilter.executor import Block, keep_players, names, object_rows, run_players, run_prefilter
 from scenicq.query.prefilter.plan import LABELS, Plan, make_plan
@@ -59,6 +60,7 @@ class CompiledMap:
         motion: Whether the scenario reads observed motion.
         observed: The properties of label objects that matter; None for all.
         whole: Whether all label objects matter, not only those that may play a role.
+        on_course: Whether it matters where label objects are on the ego's course.
         anywhere: Whether all but the network is the same over any map of the same traits.
     """
 
@@ -68,6 +70,7 @@ class CompiledMap:
     motion: bool = True
     observed: frozenset[str] | None = None
     whole: bool = False
+    on_course: bool = False
     anywhere: bool = False
 
     @classmethod
@@ -87,7 +90,8 @@ class CompiledMap:
         relevant = [names for each in every for names in relevant_properties(each, options)]
         observed = frozenset[str](asked or ()).union(*relevant)
         motion, whole = not MOTION.isdisjoint(observed), asked is not None or bool(scenario.variants)
-        return cls(scenario, network, plan, motion, observed, whole, not network.is_read)
+        on_course = any(course_column(each) for each in every)
+        return cls(scenario, network, plan, motion, observed, whole, on_course, not network.is_read)
 
     def over(self, scenario: Scenario, network: Network) -> CompiledMap:
         """Make the compiled map of another map with the same traits, from the scenario over that map."""
@@ -237,6 +241,7 @@ class Decider:
             among=among,
             recorded=recorded,
             whole=whole,
+            on_course=compiled.on_course,
         )
 
     def _recordings(self, compiled: CompiledMap, block: Block) -> BlockOutcome:
@@ -264,7 +269,7 @@ class Decider:
                     kept.append(True)
                 return candidates(
                     connection, plan, motion=compiled.motion, among=wanted, recorded=self.dataset.recorded,
-                    whole=compiled.whole,
+                    whole=compiled.whole, on_course=compiled.on_course,
                 )  # fmt: skip
         else:
             missed = run_prefilter(self.dataset, connection, plan, block)
@@ -274,7 +279,7 @@ class Decider:
             def read(wanted: NDArray[np.int64]) -> Iterator[Candidate]:
                 return candidates(
                     connection, plan, motion=compiled.motion, among=wanted, recorded=self.dataset.recorded,
-                    whole=compiled.whole,
+                    whole=compiled.whole, on_course=compiled.on_course,
                 )  # fmt: skip
 
         left = Survivors(every[missed < 0], rows, plan.roles or (), read)

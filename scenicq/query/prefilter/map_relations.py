@@ -186,7 +186,8 @@ def allowed_elements(root: Node) -> tuple[LookUp, frozenset[int]] | None:
     count = look_up.occupancy.nothing + 1
     numbers = Column(np.arange(count, dtype=np.float64), np.full(1, DEFINED))
     try:
-        found = interpret(steps_of(root, known=inner), _TABULATED, dict.fromkeys(inner, numbers))[id(root)]
+        domain = ColumnDomain(_absent, _absent, first_direction)
+        found = interpret(steps_of(root, known=inner), domain, dict.fromkeys(inner, numbers))[id(root)]
     except CannotEvaluate:
         return None
     if bool((found.status == UNKNOWN).any()):
@@ -203,10 +204,6 @@ def _among(look_up: LookUp, required: Sequence[Node]) -> frozenset[int]:
 
 def _absent(node: Node, *_: object) -> Column:
     raise CannotEvaluate(f"{type(node).__name__} is none of the element's")
-
-
-_TABULATED = ColumnDomain(_absent, _absent, first_direction)
-"""What conditions are for each element, where they hang on nothing else."""
 
 
 def shared_look_ups(node: Node) -> tuple[LookUp, LookUp] | None:
