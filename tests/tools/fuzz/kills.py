@@ -36,9 +36,11 @@ def prepare(made: Path, sound: Path) -> None:
     for more in (["--shard", "1/1", "-o", str(made / "pieces")], ["-o", str(made / "found.jsonl")]):
         words = [COMMAND, "match", PROGRAM, str(sound), *more]
         subprocess.run(words, check=True, stderr=subprocess.DEVNULL)
-    frames = sorted({json.loads(line)["frame"] for line in (made / "found.jsonl").read_text().splitlines()})
-    box = {"class": "Car", "x": 0.0, "y": 0.0, "width": 2.0, "length": 4.0, "heading": 0.0, "score": 0.5}
-    (made / "predictions.jsonl").write_text("".join(json.dumps({"frame": frame, **box}) + "\n" for frame in frames))
+    with (made / "predictions.jsonl").open("w", encoding="utf-8") as file:
+        for line in (ROOT / "sample_data" / "crossroads" / "labels.jsonl").read_text(encoding="utf-8").splitlines():
+            label = json.loads(line)
+            label["objects"] = [{**each, "score": 0.5} for each in label["objects"]]
+            file.write(json.dumps(label) + "\n")
 
 
 def writers(work: Path, sound: Path, made: Path) -> dict[str, tuple[list[str], Path]]:

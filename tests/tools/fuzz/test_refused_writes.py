@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import resource
 import shutil
 import subprocess
@@ -107,7 +108,11 @@ def check(done: Any, before: dict[str, bytes], work: Path, what: object) -> bool
     told = done.stderr
     assert (done.exit_code, told.count("error[")) == (2, 1), (what, told, done.exception)
     assert "internal error" not in told, (what, told)
-    assert contents(work) == before, (what, told)
+    left = {name for name, content in contents(work).items() if before.get(name) != content}
+    # the note of the question that a folder is for is whole before the piece, and other shards may read it
+    noted = {name for name in left if re.fullmatch(r"pieces(/\w+\.json)?", name)}
+    assert left == noted, (what, told)
+    assert before.keys() <= contents(work).keys()
     return True
 
 
@@ -132,12 +137,16 @@ def test_any_step_may_be_refused(kind, run, refusals, crossroads, made, tmp_path
     for number in range(1, 1000):
         with refusals.below(work, number):
             done = run(*words)
-        if not check(done, before, work, number):
+        if check(done, before, work, number):
+            continue
+        assert target.exists()
+        assert not [name for name in contents(work) if name.startswith(".")]
+        if refusals.taken < number:
             break
+        # what was refused it can go without
+        shutil.rmtree(work)
+        assert contents(work_folder(tmp_path, kind, crossroads)) == before
     assert number > 1
-    if refusals.taken >= number:  # it goes without
-        assert kind in {"index"}, (kind, number, refusals.taken)
-    assert target.exists()
 
 
 @contextmanager
