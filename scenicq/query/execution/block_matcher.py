@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenicq.budget import DeadlineError, deadline
+from scenicq.budget import DeadlineError
 from scenicq.forest.among import properties_of_others
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.unobserved import MOTION
@@ -22,6 +22,7 @@ from scenicq.match.problem.outcome import UNOBSERVED as REASON
 from scenicq.match.verdict import Cause, Match, Unknown, Verdict
 from scenicq.query.execution.lazy_solver import LazySolver
 from scenicq.query.execution.results import Result
+from scenicq.query.execution.sql_deadline import SqlWatch, sql_deadline
 from scenicq.query.prefilter.condition_reader import course_column
 from scenicq.query.prefilter.decision import MATCHING, UNOBSERVED, decided_frames
 from scenicq.query.prefilter.executor import Block, keep_players, names, object_rows, run_players, run_prefilter
@@ -174,6 +175,7 @@ class Decider:
         if self._connection is None:
             self._connection = self.dataset.connect(threads=self.threads, views=False)
             self._open.callback(self._connection.close)
+            self._open.enter_context(SqlWatch(self._connection, self.until))
             self._solver = self._open.enter_context(LazySolver(self.solver))
         return self._connection
 
@@ -184,7 +186,7 @@ class Decider:
             ScenarioError: The program does not fit the map.
             DeadlineError: The time is over; while results are taken, too.
         """
-        with deadline(self.until):
+        with sql_deadline(self.until):
             decided = self._decide(block)
         if self.until is not None:
             decided = replace(decided, found=self._in_time(iter(decided.found)))
@@ -200,7 +202,7 @@ class Decider:
     def _in_time(self, found: Iterator[list[Result]]) -> Iterator[list[Result]]:
         """What is found before the time is over, which is looked at while each is looked for."""
         while True:
-            with deadline(self.until):
+            with sql_deadline(self.until):
                 each = next(found, None)
             if each is None:
                 return

@@ -353,7 +353,7 @@ class ConditionReader:
 
     def _turn(self, index: int, region: Select, heading: Node | None) -> float | None:
         """How far the lane that an object is in may, or must at most, lead from its heading; None for any way."""
-        if heading is None or not is_along(heading, region, index):
+        if heading is None or not is_along(heading, region, index, self.road):
             return None
         width = self._width(index, "heading")
         return _NO_TURN if width is None else width if self.proving else width + SLACK
