@@ -1,6 +1,6 @@
 """The abstract domain of intervals: bounds that hold every value, with ends of any kind (`interval_ends`).
 
-A scalar has an interval, and a vector or region has a box. A condition has a `Truth`: whether it can hold and whether it
+A scalar has an interval, a vector or region has a box. A condition has a `Truth`: whether it can hold and whether it
 can fail. Anything else (a text, a vector field) has None. Ends may be columns over many labels or samples. Then an
 expression over observed values has exact intervals, whose ends are its values; where nothing is observed they are
 infinite.
