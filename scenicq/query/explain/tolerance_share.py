@@ -2,8 +2,8 @@
 
 Each match is decided again, once with exact positions and once with exact headings: within 1 mm and 1 mrad (`EXACT`).
 The order is random, and the work ends when the time is up. An interval is decided at its first frame, with its objects
-in their roles, because tolerances do not apply to conditions over time. A match that is then undecided counts as decided
-again, but not as dependent on the tolerance.
+in their roles, because tolerances do not apply to conditions over time. A match that is then undecided counts as
+decided again, but not as dependent on the tolerance.
 """
 
 from __future__ import annotations
