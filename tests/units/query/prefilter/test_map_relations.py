@@ -145,7 +145,9 @@ def listed_question(draw: random.Random) -> str:
         draw.choice(LINKED), f"Uniform(*{draw.choice(LISTS)}).group",
         "Uniform(*ego.lane.sections)", "Uniform(*ego.laneSection.adjacentLanes)", "Uniform(*ego.intersection.roads)",
     ])  # fmt: skip
-    facing = draw.choice(["", "", ", facing Range(-180, 180) deg", ", facing Range(-30, 30) deg relative to ego.heading"])
+    facing = draw.choice(
+        ["", "", ", facing Range(-180, 180) deg", ", facing Range(-30, 30) deg relative to ego.heading"]
+    )
     placed = draw.choice([f"new Car {draw.choice(['on', 'in'])} {place}{facing}"] * 3 + [f"new Car {ANY}"])
     lines = [f"other = {placed}"]
     if draw.random() < 0.25:
