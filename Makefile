@@ -78,6 +78,7 @@ bench: $(READY) ## Measure queries, start-up, ingest, pictures and what each ste
 	$(BIN)/python tests/tools/bench/maps.py
 	$(BIN)/python tests/tools/bench/intervals_by_hand.py
 	$(BIN)/python tests/tools/bench/intervals.py
+	$(BIN)/python tests/tools/bench/deadlines.py
 	$(BIN)/python tests/tools/bench/verdicts.py record bench-results/verdicts.jsonl
 ifdef SCENIC
 	$(BIN)/python tests/tools/bench/published.py $(SCENIC) $(DATASETS)

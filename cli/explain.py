@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator
+from contextlib import contextmanager
 from typing import Any
 
 import click
@@ -16,8 +18,8 @@ from scenicq.query.explain.frame_explanation import explain as explain_label
 from scenicq.query.explain.frame_explanation import show_explanation
 from scenicq.query.explain.interval_explanation import explain_beginning, explain_recording
 from scenicq.query.explain.moments import named_frame, named_moment
-from scenicq.store.atomic_files import write_whole
-from scenicq.store.remote_path import AnyPath
+from scenicq.store.atomic_files import whole_folder, write_whole
+from scenicq.store.remote_path import AnyPath, RemotePath
 from scenicq.store.targets import target_of
 
 from .datasets import open_checked
@@ -94,10 +96,21 @@ def explain(
     say(printable(told))
     if smt2 is not None:
         try:
-            with target_of(smt2).made_folder():
+            with _folder_to_fill(smt2) as folder:
                 for formula in explanation.formulas:
-                    write_whole(smt2 / f"{formula.name}.smt2", formula.text)
+                    write_whole(folder / f"{formula.name}.smt2", formula.text)
         except OSError as error:
             raise DataError(Diagnostic("target-unwritable", f"{smt2} cannot be written: {error.strerror}")) from None
     if not isinstance(verdict, Match) and not exit_zero:
         ctx.exit(UNDECIDED if isinstance(verdict, Unknown) else NOTHING)
+
+
+@contextmanager
+def _folder_to_fill(path: AnyPath) -> Generator[AnyPath]:
+    """A folder to write files in: one that is there, or a new one, which is there when all are in it."""
+    if isinstance(path, RemotePath) or path.exists():
+        with target_of(path).made_folder():
+            yield path
+    else:
+        with whole_folder(path) as work:
+            yield work

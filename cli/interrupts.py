@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM: a command that is told to stop does stop.
+"""Ctrl-C, SIGTERM and SIGHUP: a command that is told to stop does stop.
 
 A `KeyboardInterrupt` can get lost on its way. What `__del__` or a callback of a weak reference raises is dropped: this
 happens to one interrupt in a hundred that come at random, as the locks of imports have such callbacks. Python tells of
@@ -47,10 +47,12 @@ class Interrupts:
         self._until = 0.0
 
     def heed(self) -> None:
-        """Treat SIGTERM like Ctrl-C from now on; a shell that had SIGINT ignored keeps its will."""
+        """Treat SIGTERM and SIGHUP like Ctrl-C from now on; who had SIGINT or SIGHUP ignored keeps their will."""
         if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
             signal.signal(signal.SIGINT, self._notice)
         signal.signal(signal.SIGTERM, self._notice)
+        if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:  # `nohup` ignores it
+            signal.signal(signal.SIGHUP, self._notice)
         if hasattr(signal, "SIGALRM"):
             signal.signal(signal.SIGALRM, self._notice)
             sys.unraisablehook = self._dropped

@@ -269,7 +269,7 @@ def _uninterrupted() -> Generator[None]:
 
 def _interrupts() -> set[signal.Signals]:
     """What a caller may take for an interrupt."""
-    return {signal.SIGINT, signal.SIGTERM, signal.SIGALRM}
+    return {signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGALRM}
 
 
 def _end(worker: _Worker) -> int | None:

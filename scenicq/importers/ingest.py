@@ -302,18 +302,21 @@ def _summary(
 
 @contextmanager
 def _terminable() -> Generator[None]:
-    """Let SIGTERM end the block like Ctrl-C, so that what is half written goes away, unless the caller handles it."""
-    if (
-        threading.current_thread() is not threading.main_thread()
-        or signal.getsignal(signal.SIGTERM) is not signal.SIG_DFL
-    ):
-        yield
-        return
-    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    """Let SIGTERM and SIGHUP end the block like Ctrl-C, so that what is half written goes away.
+
+    What the caller handles or ignores stays with the caller.
+    """
+    taken: list[int] = []
+    if threading.current_thread() is threading.main_thread():
+        fatal = [signal.SIGTERM, *([signal.SIGHUP] if hasattr(signal, "SIGHUP") else [])]
+        taken += [each for each in fatal if signal.getsignal(each) is signal.SIG_DFL]
+    for each in taken:
+        signal.signal(each, signal.default_int_handler)
     try:
         yield
     finally:
-        signal.signal(signal.SIGTERM, before)
+        for each in taken:
+            signal.signal(each, signal.SIG_DFL)
 
 
 def _map_files(maps: Sequence[str | Path]) -> dict[str, Path]:

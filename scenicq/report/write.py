@@ -145,15 +145,15 @@ def new_report(folder: AnyPath) -> Generator[Path]:
         return
     check_target(folder)
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        for each in _leftovers(folder):
-            shutil.rmtree(each, ignore_errors=True)
-        work = Path(tempfile.mkdtemp(prefix=_WORK, dir=folder))
-        try:
-            yield work
-            _replace(work, folder)
-        finally:
-            shutil.rmtree(work, ignore_errors=True)
+        with target_of(folder).made_folder():
+            for each in _leftovers(folder):
+                shutil.rmtree(each, ignore_errors=True)
+            work = Path(tempfile.mkdtemp(prefix=_WORK, dir=folder))
+            try:
+                yield work
+                _replace(work, folder)
+            finally:
+                shutil.rmtree(work, ignore_errors=True)
     except OSError as error:
         raise _unwritable(folder, error) from None
 

@@ -10,7 +10,7 @@ from typing import BinaryIO
 
 from scenicq.errors import DataError
 from scenicq.store.remote_path import AnyPath
-from scenicq.store.targets import target_of
+from scenicq.store.targets import open_staged, target_of
 
 __all__ = ["COMPLETE", "WholeFile", "whole_file", "whole_folder", "write_whole"]
 
@@ -44,7 +44,7 @@ class WholeFile:
         """
         # first of all the name: an interrupt may come when the file is there and has not been handed on
         self._staged = self._target.stage_file(self._folder)
-        self._file = self._staged.open("wb")
+        self._file = open_staged(self._staged)
         return self._file
 
     def finish(self) -> None:

@@ -15,7 +15,7 @@ from collections.abc import Generator
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Protocol
+from typing import BinaryIO, Protocol
 
 try:
     import fcntl
@@ -25,7 +25,7 @@ except ImportError:
 from scenicq.errors import DataError, Diagnostic
 from scenicq.store.remote_path import AnyPath, RemotePath
 
-__all__ = ["ReserveFile", "WriteTarget", "sync_folder", "target_of"]
+__all__ = ["ReserveFile", "WriteTarget", "open_staged", "sync_folder", "target_of"]
 
 _STAGE = "scenicq-"
 """How the temporary folders begin in which lies what is to be sent."""
@@ -128,7 +128,9 @@ class _Renamed:
         pass
 
     def stage_file(self, folder: Path | None) -> Path:
-        return (folder or self.path.parent) / f".{self.path.name}.{os.getpid()}.tmp"
+        folder = folder or self.path.parent
+        _remove_left(folder, f".{self.path.name}.", ".tmp")
+        return folder / f".{self.path.name}.{os.getpid()}.tmp"
 
     def publish_file(self, staged: Path) -> None:
         staged.replace(self.path)
@@ -279,8 +281,43 @@ def _empty(folder: Path) -> None:
             path.unlink()
 
 
+def open_staged(staged: Path) -> BinaryIO:
+    """Open a file for writing that is locked until it is closed or its process is dead.
+
+    Raises:
+        OSError: It cannot be written.
+    """
+    while True:
+        file = staged.open("wb")
+        _locked(file.fileno())
+        # before it was locked, another process may have taken it for one that is left
+        with suppress(FileNotFoundError):
+            if fcntl is None or os.path.samestat(staged.stat(), os.fstat(file.fileno())):
+                return file
+        file.close()
+
+
+def _remove_left(folder: Path, begin: str, end: str) -> None:
+    """Remove files with a number between a beginning and an end of their names that no process holds any more.
+
+    They are of processes that were killed. Where nothing says that a file is held by nobody, it stays.
+    """
+    with suppress(OSError):
+        for name in os.listdir(folder):
+            if not (name.startswith(begin) and name.endswith(end) and name[len(begin) : -len(end)].isdecimal()):
+                continue
+            with suppress(OSError):
+                handle = os.open(folder / name, os.O_RDONLY)
+                try:
+                    if fcntl is not None:
+                        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                        os.unlink(folder / name)
+                finally:
+                    os.close(handle)
+
+
 def _locked(handle: int) -> bool:
-    """Lock a folder, and say whether it is locked; True also where its file system has no locks."""
+    """Lock a folder or a file, and say whether it is locked; True also where its file system has no locks."""
     try:
         if fcntl is not None:
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -145,10 +145,10 @@ class Examples:
     decide: Callable[[Mapping[int, Truth]], Runs]
     found: list[Example] = field(default_factory=list[Example])
     _asked: int = 0
-    _same_reading: dict[int, NDArray[np.int64]] = field(init=False)
-    _observed: dict[int, NDArray[np.bool_]] = field(init=False)
+    _same_reading: dict[int, NDArray[np.int64]] = field(default_factory=dict[int, "NDArray[np.int64]"])
+    _observed: dict[int, NDArray[np.bool_]] = field(default_factory=dict[int, "NDArray[np.bool_]"])
 
-    def __post_init__(self) -> None:
+    def _compare_readings(self) -> None:
         """Find the samples at which a condition reads the same values, so that it has one truth."""
         readings = {number: self.columns.readings(each) for number, each in self.conditions.items()}
         self._observed = {number: each >= 0 for number, each in readings.items()}
@@ -208,6 +208,8 @@ class Examples:
         """The certain truths of each condition, unknown where it is open; None if there is no example."""
         if self._ask(None) is not True:
             return None
+        # takes as long as there are samples, which a start without an example shall not
+        self._compare_readings()
         base = self.found[0].truth
         asked_places = [
             (number, sample)

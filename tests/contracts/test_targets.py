@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -146,3 +149,37 @@ def test_a_folder_is_made_locked_and_removed_without_a_trace(place: AnyPath) -> 
     target.remove_folder()
     assert there(place) == {}
     target.remove_folder()
+
+
+LEAVES = """
+import os, sys
+from pathlib import Path
+from scenicq.store.atomic_files import WholeFile
+whole = WholeFile(Path(sys.argv[1]))
+whole.open().write(b"half")
+print("writes", flush=True)
+sys.stdin.readline() or os._exit(1)
+"""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="locks of POSIX")
+def test_what_a_dead_process_leaves_is_removed_by_the_next_and_nothing_else(tmp_path: Path) -> None:
+    """Neither what a process still writes, nor what has a name that is alike."""
+    for name in (".a.jsonl.tmp", ".a.jsonl.x.tmp", ".b.jsonl.7.tmp", "a.jsonl.7.tmp"):
+        (tmp_path / name).write_text(name)
+    alike = there(tmp_path)
+    words = [sys.executable, "-c", LEAVES, str(tmp_path / "a.jsonl")]
+    writers = [subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) for _ in range(2)]
+    for each in writers:
+        assert each.stdout is not None
+        assert each.stdout.readline() == "writes\n"
+    dead, alive = writers
+    dead.kill()
+    dead.communicate()
+    assert there(tmp_path).keys() - alike.keys() == {f".a.jsonl.{each.pid}.tmp" for each in writers}
+    write_whole(tmp_path / "a.jsonl", "whole")
+    assert there(tmp_path) == {**alike, "a.jsonl": b"whole", f".a.jsonl.{alive.pid}.tmp": b""}
+    alive.kill()
+    alive.communicate()
+    write_whole(tmp_path / "a.jsonl", "again")
+    assert there(tmp_path) == {**alike, "a.jsonl": b"again"}

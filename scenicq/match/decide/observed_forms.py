@@ -13,14 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenicq.errors import CannotEvaluate
-from scenicq.forest.among import LABEL_OBJECTS, LabelElements, among_column
+from scenicq.forest.among import LABEL_OBJECTS, LabelElements, among_column, asks_each_once
 from scenicq.forest.clear_columns import ClearColumns
 from scenicq.forest.column_domain import first_direction
 from scenicq.forest.columns import DEFINED, UNKNOWN, Column, Data, constant_column, truth_of
 from scenicq.forest.groups import Condition, Group
 from scenicq.forest.interpret import Steps, interpret, steps_of
-from scenicq.forest.nodes import COURSE, Among, Constant, DirectionAt, Feature, Node
-from scenicq.forest.walk import children, is_leaf, postorder
+from scenicq.forest.nodes import COURSE, Among, Constant, DirectionAt, Feature
+from scenicq.forest.walk import is_leaf, postorder
 from scenicq.match.decide.closed_form import ClosedForm, GroupEvaluation
 from scenicq.match.decide.range_forms import Columns, Lookup
 from scenicq.match.options import MatchOptions
@@ -51,7 +51,7 @@ def observed_form_of(group: Group) -> ClosedForm | None:
     known = {id(node): constant_column(node.value) for node in nodes if isinstance(node, Constant)}
     steps = steps_of(*roots, known=known)
     # what two conditions on others have in common takes a search
-    tells_open = all(_uses_of_others(root) <= 1 for root in roots)
+    tells_open = all(map(asks_each_once, roots))
 
     def evaluate(get: Lookup, options: MatchOptions, lookups: MapLookups) -> GroupEvaluation:
         if not isinstance(get, Columns):
@@ -94,11 +94,3 @@ def _unsure(steps: Steps, found: Mapping[int, Column]) -> NDArray[np.intp]:
                 unknown = unknown & np.not_equal(found[id(each)].status, UNKNOWN)
             count = count + unknown
     return count
-
-
-def _uses_of_others(root: Node) -> int:
-    """How often an expression asks label objects without a role, each use of what is shared counted."""
-    counts: dict[int, int] = {}
-    for node in postorder((root,)):
-        counts[id(node)] = isinstance(node, Among) + sum(counts[id(each)] for each in children(node))
-    return counts[id(root)]

@@ -11,18 +11,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenicq.budget import DeadlineError, deadline
+from scenicq.budget import DeadlineError
 from scenicq.forest.among import properties_of_others
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.unobserved import MOTION
 from scenicq.geometry.network import Network
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.constraints import relevant_properties
-from scenicq.match.verdict import Match, Verdict
+from scenicq.match.problem.outcome import UNOBSERVED as REASON
+from scenicq.match.verdict import Cause, Match, Unknown, Verdict
 from scenicq.query.execution.lazy_solver import LazySolver
 from scenicq.query.execution.results import Result
+from scenicq.query.execution.sql_deadline import SqlWatch, sql_deadline
 from scenicq.query.prefilter.condition_reader import course_column
-from scenicq.query.prefilter.decision import decided_frames
+from scenicq.query.prefilter.decision import MATCHING, UNOBSERVED, decided_frames
 from scenicq.query.prefilter.executor import Block, keep_players, names, object_rows, run_players, run_prefilter
 from scenicq.query.prefilter.plan import LABELS, Plan, make_plan
 from scenicq.query.prefilter.survivors import Candidate, CandidateRows, candidate_rows, candidates
@@ -173,6 +175,7 @@ class Decider:
         if self._connection is None:
             self._connection = self.dataset.connect(threads=self.threads, views=False)
             self._open.callback(self._connection.close)
+            self._open.enter_context(SqlWatch(self._connection, self.until))
             self._solver = self._open.enter_context(LazySolver(self.solver))
         return self._connection
 
@@ -183,7 +186,7 @@ class Decider:
             ScenarioError: The program does not fit the map.
             DeadlineError: The time is over; while results are taken, too.
         """
-        with deadline(self.until):
+        with sql_deadline(self.until):
             decided = self._decide(block)
         if self.until is not None:
             decided = replace(decided, found=self._in_time(iter(decided.found)))
@@ -199,7 +202,7 @@ class Decider:
     def _in_time(self, found: Iterator[list[Result]]) -> Iterator[list[Result]]:
         """What is found before the time is over, which is looked at while each is looked for."""
         while True:
-            with deadline(self.until):
+            with sql_deadline(self.until):
                 each = next(found, None)
             if each is None:
                 return
@@ -221,13 +224,14 @@ class Decider:
         return BlockOutcome(missed, self._matched(self._left(compiled)), named)
 
     def _partly_decided(self, compiled: CompiledMap) -> Iterator[list[Result]]:
-        """The results of the frames that the prefilter has left, where SQL says that some surely match."""
+        """The results of the frames that the prefilter has left, where SQL tells some of them."""
         rows = decided_frames(self.connection, compiled.plan.decision, LABELS, compiled.plan.left)
-        open_ = np.array([number for number, sure, *_ in rows if not sure], dtype=np.int64)
-        asked = self._matched(self._left(compiled, open_) if len(open_) else iter(()))
-        proved, none = Match({}, {}), dict[str, str]()
-        for _, sure, frame, recording, time in rows:
-            yield [Result(frame, recording, time, proved, none)] if sure else next(asked)
+        left = np.array([number for number, told, *_ in rows if not told], dtype=np.int64)
+        asked = self._matched(self._left(compiled, left) if len(left) else iter(()))
+        verdicts: dict[int, Verdict] = {MATCHING: Match({}, {}), UNOBSERVED: Unknown(REASON, Cause(""))}
+        none = dict[str, str]()
+        for _, told, frame, recording, time in rows:
+            yield [Result(frame, recording, time, verdicts[told], none)] if told else next(asked)
 
     def _left(self, compiled: CompiledMap, among: NDArray[np.int64] | None = None) -> Iterator[Candidate]:
         """The labels that the prefilter has left, with as much of each as the matcher looks at."""

@@ -13,6 +13,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+from scenicq.budget import DeadlineError
 from scenicq.compiler.absent import check_enforced
 from scenicq.compiler.element_lookups import LaneRule
 from scenicq.compiler.program import compile_scenario
@@ -42,6 +43,7 @@ from scenicq.query.execution.recorded_columns import RecordedColumn, columns_of
 from scenicq.query.execution.result_selection import ResultSelection
 from scenicq.query.execution.results import Funnel, Result, limit_matches
 from scenicq.query.execution.scenario_copies import ScenarioCopies
+from scenicq.query.execution.sql_deadline import sql_deadline
 from scenicq.query.prefilter.executor import Block, Extent, blocks, blocks_of, extents, names, whole_recordings
 from scenicq.query.prefilter.plan import Plan
 from scenicq.recent import Recent
@@ -608,20 +610,27 @@ class Query:
                     yield from self._lacking(maps[0], lacking[maps[0]], ahead.taken)
                     continue
                 there = self.planned_map(maps[0])
-                where, chosen = self._extents(decider.connection), {name: self._between(name) for name in maps}
-                least = 4 * hands.jobs if hands.jobs > 1 else 1
-                cut = blocks_of(where, chosen, least=least, whole=self.options.prefilter)
+                over_time = self.over_time(there.scenario)
+                try:
+                    cut = self._cut(maps, decider, 4 * hands.jobs if hands.jobs > 1 else 1, whole=over_time)
+                except DeadlineError:
+                    self.funnel.cut = True
+                    return
                 every, reasons = self.options.every, self._reasons(there.scenario)
-                merge = partial(merge_frames, every=every, reasons=reasons)
-                if self.over_time(there.scenario):
-                    cut = whole_recordings(self.dataset, decider.connection, cut)
-                    merge = partial(merge_intervals, every=every, reasons=reasons)
+                merge = partial(merge_intervals if over_time else merge_frames, every=every, reasons=reasons)
                 with closing(merge(there.plan, hands.decide(cut, ahead.told), self.funnel, ahead.taken)) as merged:
                     for result in merged:
                         self.funnel.count_recorded(result)
                         yield result
                 if self.funnel.cut:
                     return
+
+    def _cut(self, maps: Sequence[str], decider: Decider, least: int, *, whole: bool) -> list[Block]:
+        """The frames of some maps that are looked at, cut into so many blocks at least, or where recordings end."""
+        with sql_deadline(self.options.until):
+            where, chosen = self._extents(decider.connection), {name: self._between(name) for name in maps}
+            cut = blocks_of(where, chosen, least=least, whole=self.options.prefilter)
+            return whole_recordings(self.dataset, decider.connection, cut) if whole else cut
 
     def _lacking(self, map_name: str, told: Diagnostic, progress: Callable[[int], None]) -> Iterator[Result]:
         """The frames of a map that lacks what the program needs, which are counted already."""

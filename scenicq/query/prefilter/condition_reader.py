@@ -95,6 +95,7 @@ class ColumnCondition:
         region: For a condition on memberships: SQL that holds of some row of the object's (or the ego's).
         what: The feature or requirement, in the words of the program.
         span: Where the program says it.
+        open: SQL that is true where what is not observed would tell, of a condition that is to prove something.
     """
 
     objects: tuple[int, ...]
@@ -102,6 +103,7 @@ class ColumnCondition:
     region: str = ""
     what: str = ""
     span: Span | None = None
+    open: SqlTruth = False
 
 
 def object_columns(alias: str, prefix: str = "") -> dict[str, str | tuple[str, str]]:

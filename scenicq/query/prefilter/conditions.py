@@ -11,8 +11,10 @@ from dataclasses import replace
 from itertools import chain
 
 from scenicq.errors import Span
+from scenicq.forest import build
+from scenicq.forest.among import asks_each_once, asks_others
 from scenicq.forest.groups import PARAMS, Comparison, Condition, Group
-from scenicq.forest.nodes import Node, PointIn, Select
+from scenicq.forest.nodes import Logic, LogicOp, Node, PointIn, Select
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.unobserved import is_only_observed
 from scenicq.forest.walk import conjuncts, postorder
@@ -38,6 +40,7 @@ from scenicq.query.prefilter.map_relations import (
     shared_look_ups,
 )
 from scenicq.query.prefilter.other_objects import conditions_of, proof, role_conditions
+from scenicq.query.prefilter.sql_ends import all_of, any_of
 from scenicq.store.classes import Granularity
 from scenicq.store.sql import sql_text
 
@@ -119,7 +122,8 @@ def sufficient_conditions(
     signature = (*told, frozenset[str]())
     for group in build_groups(scenario, signature, options):
         # what is known up to two ends must hold whichever it is
-        found += _proof(group.certain_group, reader, scenario, options.classes)
+        proved = [*_proof(group.certain_group, reader, scenario, options.classes)]
+        found += _told_apart(proved, group, reader, scenario, options.classes)
     if any(each.sql is False for each in found):
         return None
     return tuple(each for each in found if each.region or each.sql is not True)
@@ -161,6 +165,46 @@ def _proof(
                     yield proved
         elif constraint is not along:
             yield from reader.comparison(constraint, meant, None if along is None else along.expression)
+
+
+def _told_apart(
+    proved: Sequence[ColumnCondition], group: Group, reader: ConditionReader, scenario: Scenario, classes: Granularity
+) -> Sequence[ColumnCondition]:
+    """What proves a group, as one condition that also says where the group is surely open, if SQL can tell that."""
+    if len(group.constraints) != 1 or not isinstance(group.constraints[0], Condition):
+        return proved
+    possible, certain = (each.constraints[0].expression for each in (group, group.certain_group))
+    parts = [*conditions_of(certain)]
+    asking = asks_others(possible)
+    # what two conditions on others have in common takes a search; what is known of both kinds, too
+    if asking is not (possible is certain) or not asks_each_once(possible):
+        return proved
+    holds = [each for part in conditions_of(possible) for each in _possibly(part, reader, scenario, classes)]
+    fails = [[*_possibly(_opposite(part), reader, scenario, classes)] for part in parts]
+    told = [*proved, *holds, *(each for some in fails for each in some)]
+    about = {index for each in told for index in each.objects}
+    if len(about) > 1 or any(each.region for each in told):
+        return proved
+    failing = any_of([all_of([each.sql for each in some]) for some in fails])
+    open_ = all_of([*(each.sql for each in holds), failing])
+    return [ColumnCondition(tuple(about), all_of([each.sql for each in proved]), open=open_)]
+
+
+def _opposite(part: Node) -> Node:
+    """The opposite of a condition, without negations of negations."""
+    is_negation = isinstance(part, Logic) and part.op is LogicOp.NOT
+    return part.args[0] if isinstance(part, Logic) and is_negation else build.opposite(part)
+
+
+def _possibly(
+    part: Node, reader: ConditionReader, scenario: Scenario, classes: Granularity
+) -> Iterator[ColumnCondition]:
+    """What proves that a condition holds for something of what is not known."""
+    found = proof(part, scenario, classes, possibly=True)
+    if found is not None:
+        yield found
+    else:
+        yield from reader.requirement(part)
 
 
 def _is_told_by(heading: Comparison, place: Comparison, road: RoadDirection) -> bool:

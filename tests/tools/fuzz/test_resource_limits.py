@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from kills import COMMAND, outcome_after, writers
+from kills import COMMAND, outcome_after, prepare, writers
 
 KINDS = tuple(writers(Path(), Path(), Path()))
 LIMITS = [("RLIMIT_NOFILE", most) for most in (5, 6, 7, 8, 10, 13)] + [
@@ -33,19 +33,18 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 
 @pytest.fixture(scope="module")
-def pieces(crossroads, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("of shards") / "pieces"
-    words, _ = writers(folder.parent, crossroads, folder)["shard"]
-    subprocess.run([COMMAND, *words], check=True, stderr=subprocess.DEVNULL)
+def made(crossroads, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("before") / "made"
+    prepare(folder, crossroads)
     return folder
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="limits are those of Linux")
 @pytest.mark.parametrize(("kind", "limit", "most"), LIMITED_WRITERS)
 @pytest.mark.one_in(56)
-def test_what_runs_out_leaves_nothing_and_the_next_run_does_the_work(kind, limit, most, crossroads, pieces, tmp_path):
+def test_what_runs_out_leaves_nothing_and_the_next_run_does_the_work(kind, limit, most, crossroads, made, tmp_path):
     shutil.copytree(crossroads, tmp_path / "copy")
-    words, target = writers(tmp_path, crossroads, pieces)[kind]
+    words, target = writers(tmp_path, crossroads, made)[kind]
     before = contents(tmp_path)
     line = [sys.executable, "-c", LIMITED, limit, str(most), COMMAND, *words]
     # Python would write the first bytes of a compiled module, and never start again

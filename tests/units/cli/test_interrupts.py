@@ -18,6 +18,7 @@ from scenicq_cli import interrupts, main
 
 interrupts.INSIST_S = 0.2
 signal.signal(signal.SIGINT, signal.default_int_handler)
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 @click.command()
 def info():
@@ -34,7 +35,7 @@ main.main()
 """
 
 
-@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
 @pytest.mark.parametrize(
     "then",
     ["time.sleep(30)", "raise RuntimeError('Query interrupted')", "raise"],
@@ -216,11 +217,13 @@ def test_a_module_that_does_not_end_loading_is_interrupted_all_the_same(tmp_path
     assert (done.returncode, done.stderr) == (130, "interrupted\n")
 
 
-def test_an_ignored_interrupt_stays_ignored():
+@pytest.mark.parametrize("name", ["SIGINT", "SIGHUP"])
+def test_an_ignored_interrupt_stays_ignored(name):
+    """As a job in the background has the one ignored, and `nohup` the other."""
     program = (
         "import os, signal\nfrom scenicq_cli.interrupts import Interrupts\n"
-        "signal.signal(signal.SIGINT, signal.SIG_IGN)\nInterrupts().heed()\n"
-        "os.kill(os.getpid(), signal.SIGINT)\nprint('alive')"
+        f"signal.signal(signal.{name}, signal.SIG_IGN)\nInterrupts().heed()\n"
+        f"os.kill(os.getpid(), signal.{name})\nprint('alive')"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=20, check=True)
     assert done.stdout == "alive\n"

@@ -154,6 +154,7 @@ def big_source(tmp_path_factory):
 def _heed_interrupts() -> None:
     """A job in the background of a shell ignores interrupts, and so would what it starts."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 
 PIPES = {
@@ -165,8 +166,8 @@ PIPES = {
 
 
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-@pytest.mark.one_in(2)
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.one_in(3)
 def test_an_interrupted_ingest_leaves_nothing(command, big_source, tmp_path, number):
     words = [command, "ingest", str(big_source), str(tmp_path / "dataset"), "-q"]
     with subprocess.Popen(words, **PIPES) as process:

@@ -289,10 +289,9 @@ def usual(command, program, crossroads, tmp_path_factory):
     for what in ("match a file", "shard"):
         assert outcome(words(what), cwd=start)[0] == 0
     shutil.copytree(crossroads, start / "made")
-    frames = sorted({json.loads(line)["frame"] for line in (start / "out.jsonl").read_text().splitlines()})
-    box = {"class": "Car", "x": 0.0, "y": 0.0, "width": 2.0, "length": 4.0, "heading": 0.0, "score": 0.5}
-    lines = (json.dumps({"frame": frame, **box}) + "\n" for frame in frames)
-    (start / "predictions.jsonl").write_text("".join(lines))
+    labels = map(json.loads, (SAMPLES / "crossroads" / "labels.jsonl").read_text().splitlines())
+    lines = ({**each, "objects": [{**one, "score": 0.5} for one in each["objects"]]} for each in labels)
+    (start / "predictions.jsonl").write_text("".join(json.dumps(line) + "\n" for line in lines))
     known = {}
 
     def run(what):

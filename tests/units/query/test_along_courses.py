@@ -199,7 +199,7 @@ def test_names_alone_are_those_of_the_matches(drawn: Drawn, rounds) -> None:
         text = f"{HEAD}require {condition}\n"
         frames = _found(drawn.dataset, text)
         names = _found(drawn.dataset, text, proofs=False)
-        assert {name for name, sure in names.items() if sure} == {name for name, sure in frames.items() if sure}
+        assert names == frames
         unknown += sum(1 for sure in frames.values() if sure is None)
     assert unknown or not drawn.dataset.network(drawn.dataset.maps[0]).features
 

@@ -104,6 +104,13 @@ UNCERTAIN = {
     ("two", "0 < along(ego, lead) < 25\nrequire along(lead, next) > 2"),
     ("two", "along(ego, lead) > 0\nrequire (distance from lead to next) < 12\nrequire along(ego, next) < 30"),
     ("alike", "along(ego, lead) > 0\nrequire along(ego, next) > 0"),
+    ("", "any(0 < along(ego, c) < 30 for c in others(Car)) and not any(beside(ego, c) > 1 for c in others(Vehicle))"),
+    ("", "any(beside(ego, c) > 5 for c in others(Car)) or not any(beside(ego, c) > 5 for c in others(Car))"),
+    ("", "any(beside(ego, c) > 5 for c in others(Car)) and not any(beside(ego, c) > 5 for c in others(Car))"),
+    ("", "len([c for c in others(Object) if along(c, ego) > 0]) == 2"),
+    ("", "all(along(ego, c) < 40 for c in others(Car))\nrequire ego.speed < 3"),
+    ("lead", "not any(c is lead and along(ego, c) > 3 for c in others(Object))"),
+    ("lead", "not any((distance from c to lead) < 9 and c.speed < 3 for c in others(Object))"),
 }
 
 
@@ -133,8 +140,9 @@ def _uncertain(folder: Path, seed: int) -> Dataset:
     return open_dataset(folder)
 
 
-def _verdicts(dataset: Dataset, text: str, *, prefilter: bool) -> dict[str, object]:
-    query = Query(dataset, Source("p.scenic", text), QueryOptions(prefilter=prefilter, every=True))
+def _verdicts(dataset: Dataset, text: str, *, prefilter: bool, proofs: bool = True) -> dict[str, object]:
+    options = QueryOptions(prefilter=prefilter, every=proofs, proofs=proofs)
+    query = Query(dataset, Source("p.scenic", text), options)
     return {each.frame: each.verdict for each in query.results()}
 
 
@@ -160,6 +168,10 @@ def test_what_is_not_observed_is_told_of_many_as_of_each(tmp_path, monkeypatch, 
         with monkeypatch.context() as patch:
             patch.setattr(first_fit, "observed_form_of", lambda group: None)
             assert together == _verdicts(dataset, text, prefilter=False), text
+        # without proofs columns tell some of it
+        names = _verdicts(dataset, text, prefilter=True, proofs=False)
+        told = {frame: type(verdict) for frame, verdict in sifted.items() if isinstance(verdict, Match | Unknown)}
+        assert told == {frame: type(verdict) for frame, verdict in names.items()}, text
         left = {frame: verdict for frame, verdict in together.items() if isinstance(verdict, Match | Unknown)}
         assert left == {frame: sifted[frame] for frame in left}, text
         unknown += sum(isinstance(verdict, Unknown) for verdict in together.values())

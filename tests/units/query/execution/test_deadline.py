@@ -6,19 +6,24 @@ import json
 import math
 import re
 import time
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import duckdb
 import pytest
 
 from scenicq import budget
+from scenicq.budget import DeadlineError
 from scenicq.match.options import MatchOptions
 from scenicq.query.execution.pieces import fingerprint
 from scenicq.query.execution.program_files import read_program
 from scenicq.query.execution.records import record
 from scenicq.query.execution.run import Query, QueryOptions
+from scenicq.query.execution.sql_deadline import SqlWatch, sql_deadline
 from scenicq.store.dataset import Dataset, open_dataset
+from scenicq.store.in_memory import connect_in_memory
 
 PROGRAM = Path(__file__).parents[4] / "sample_data" / "scenarios" / "01_pedestrian_facing_ego.scenic"
 OPTIONS = QueryOptions(MatchOptions(classes="coarse"), prefilter=False, every=True)
@@ -109,3 +114,38 @@ def test_a_clock_that_is_set_ends_nothing_and_delays_nothing() -> None:
     for file in (file for folder in ("scenicq", "cli") for file in (root / folder).rglob("*.py")):
         text = file.read_text(encoding="utf-8")
         assert not re.search(r"\btime\.time\(|from time import (.*\b)?time\b", text), file
+
+
+def test_sql_is_interrupted_when_the_time_is_over() -> None:
+    """A statement that takes for ever ends soon after, and so does every one that begins later."""
+    slow = "SELECT count(*) FROM range(100000000) a, range(100000000) b WHERE a.range * b.range % 7 = 3"
+    with closing(connect_in_memory()) as connection:
+        until = time.monotonic() + 0.2
+        with SqlWatch(connection, until):
+            with pytest.raises(DeadlineError), sql_deadline(until):
+                connection.execute(slow).fetchall()
+            assert time.monotonic() >= until
+            with pytest.raises(duckdb.InterruptException):
+                connection.execute(slow).fetchall()
+        assert connection.execute("SELECT 7").fetchall() == [(7,)]
+
+
+def test_an_interrupt_before_is_none_of_the_deadline() -> None:
+    with pytest.raises(duckdb.InterruptException), sql_deadline(time.monotonic() + 60):
+        raise duckdb.InterruptException
+
+
+def test_a_prefilter_that_takes_for_ever_is_cut(dataset: Dataset, monkeypatch: pytest.MonkeyPatch) -> None:
+    program = replace(read_program(PROGRAM), name="slow.scenic")
+    late = Query(dataset, program, QueryOptions(MatchOptions(classes="coarse"), until=time.monotonic() + 2))
+    slow = "(SELECT count(*) FROM range(100000000) a, range(100000000) b WHERE a.range * b.range % 7 = f)"
+
+    def slowed(name: str) -> Any:
+        planned = Query.planned_map(late, name)
+        return replace(planned, plan=replace(planned.plan, columns=f"SELECT f, missed + 0 * {slow} AS missed FROM "
+                                             f"({planned.plan.columns})"))  # fmt: skip
+
+    assert slowed(dataset.maps[0]).plan.stages
+    monkeypatch.setattr(late, "planned_map", slowed)
+    assert records(late) == []
+    assert (late.funnel.cut, late.funnel.frames) == (True, 0)
