@@ -29,7 +29,7 @@ from scenicq.geometry.abstract_map import AbstractElement, AbstractList, NeedsMa
 from scenicq.geometry.elements import Maneuver, NetworkElement
 from scenicq.syntax.hints import condition_hint
 
-__all__ = ["binary", "compare", "iterate", "symbolic"]
+__all__ = ["binary", "compare", "is_in_list", "iterate", "symbolic"]
 
 
 def symbolic(value: ModelValue) -> bool:
@@ -97,6 +97,33 @@ def _same_choice(left: ModelValue, right: ModelValue, span: Span) -> ModelValue:
     }
     one, other = _numbered(left, codes, span), _numbered(right, codes, span)
     return build.compare(CompareOp.EQ, one, other, span)
+
+
+def is_in_list(left: ModelValue, right: Choice, span: Span) -> ModelValue:
+    """Whether an element of the map is in a random list of such, without going through all lists.
+
+    None where something else is looked for.
+    """
+    lists = [option for option in right.options if isinstance(option, list | tuple)]
+    items = {item for option in lists for item in map(_element_of, option)}
+    atoms = _atoms(left)
+    if len(lists) < len(right.options) or atoms is None or None in items:
+        return None
+    if not atoms & items:
+        return False
+    codes: dict[object, float] = {}
+    one = _numbered(left, codes, span)
+    nothing = build.constant(-1.0, span)
+    same: list[ModelValue] = []
+    for place in range(max(map(len, lists))):
+        there = [_numbered(each[place], codes, span) if place < len(each) else nothing for each in lists]
+        same.append(build.compare(CompareOp.EQ, one, Select(right.index, tuple(there), span=span), span))
+    return operators.combine("or", same, span) if len(same) > 1 else same[0]
+
+
+def _element_of(item: ModelValue) -> object:
+    """An element of the map by itself; None of anything else."""
+    return item if isinstance(item, NetworkElement | Maneuver) and not isinstance(item, AbstractElement) else None
 
 
 def _atom(value: ModelValue) -> object:

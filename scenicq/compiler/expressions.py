@@ -13,7 +13,7 @@ from scenicq.compiler import operators
 from scenicq.compiler.arithmetic import check_hashable, plain_unary
 from scenicq.compiler.assignment import assign_around, go_through, through_others
 from scenicq.compiler.attributes import attribute
-from scenicq.compiler.comparisons import binary, compare, iterate, symbolic
+from scenicq.compiler.comparisons import binary, compare, is_in_list, iterate, symbolic
 from scenicq.compiler.coroutines import LibraryCall, LibraryName
 from scenicq.compiler.courses import option_of
 from scenicq.compiler.distributions import DISTRIBUTIONS, interval
@@ -180,6 +180,12 @@ def _compare_chain(run: Interpreter, node: ast.ComparisonChain, scope: Environme
             return False
         right = evaluate(run, comparison.right, scope)
         if comparison.operator in ("in", "not in") and _holds_lists(right):
+            found = is_in_list(left, cast(Choice, right), node.span)
+            if found is not None:
+                run.budget.pay(length_of(left) + length_of(right), node.span)
+                results.append(found if comparison.operator == "in" else _unary("not", found, node.span))
+                left = right
+                continue
             right = option_of(run, right, comparison.right.span)
         run.budget.pay(length_of(left) + length_of(right), node.span)
         results.append(compare(comparison.operator, left, right, node.span))

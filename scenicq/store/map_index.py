@@ -22,7 +22,7 @@ from scenicq.store.columns import Memberships
 from scenicq.store.last_lanes import LanePairs, last_lanes
 from scenicq.store.schema import MEMBERSHIP_RADIUS_M
 
-__all__ = ["MapIndex"]
+__all__ = ["NO_WAY", "MapIndex"]
 
 NO_WAY = 1e9
 """How far what has no direction leads from any heading."""

@@ -11,7 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from shapely import Point, union_all
+from shapely import Point, Polygon, union_all
 
 from scenicq.compiler.program import compile_scenario
 from scenicq.errors import ScenarioError, Source
@@ -20,6 +20,7 @@ from scenicq.forest.nodes import GOING, LAST_LANE, Constant, Index, Node, PointI
 from scenicq.forest.walk import leaves
 from scenicq.geometry.abstract_map import AbstractNetwork
 from scenicq.geometry.features import REFERENCES, MapFeature
+from scenicq.geometry.network import Network
 from scenicq.geometry.regions import PolygonSet
 from scenicq.match.matcher import Matcher
 from scenicq.match.options import MatchOptions
@@ -194,6 +195,26 @@ def called_otherwise(features: Sequence[MapFeature], number: int) -> list[MapFea
     ]
 
 
+def cut_lanes(features: Sequence[MapFeature]) -> list[MapFeature]:
+    """The same map with every other lane in two sections, one of which has a line of its own that leads elsewhere."""
+    found = list(features)
+    for lane in [each for each in features if each.kind == "lane"][::2]:
+        (x, y), (end_x, end_y) = (lane.properties["centerline"][0][end] for end in (0, -1))
+        dx, dy, mid_x, mid_y = end_x - x, end_y - y, (x + end_x) / 2, (y + end_y) / 2
+        far = 1000 / math.hypot(dx, dy)
+        dx, dy = far * dx, far * dy
+        sides = [(mid_x - dy, mid_y + dx), (mid_x + dy, mid_y - dx)]
+        for number, sign in enumerate((-1, 1)):
+            beyond = [(px + sign * dx, py + sign * dy) for px, py in reversed(sides)]
+            area = lane.shape.intersection(Polygon([*sides, *beyond]))
+            line = [[mid_x - dx / 9 + dy / 30, mid_y - dy / 9 - dx / 30], [mid_x, mid_y]]
+            own = {"centerline": [line]} if sign < 0 else {}
+            beside = {key: lane.properties[key] for key in ("left", "right") if key in lane.properties}
+            kept = {"lane": lane.id, **beside, **own}
+            found.append(MapFeature(f"{lane.id}_s{number}", "lane_section", area, kept))
+    return found
+
+
 def labels(draw: random.Random, count: int) -> list[Label]:
     """Cars and people on lanes and crossings, near their edges, where lanes overlap, and elsewhere."""
 
@@ -222,6 +243,9 @@ def labels(draw: random.Random, count: int) -> list[Label]:
         )
         for number in range(count)
     ]  # fmt: skip
+
+
+CUT = Network("cut", cut_lanes(STREET.features))
 
 
 @pytest.fixture(scope="module")
@@ -260,17 +284,33 @@ def named(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
     return open_dataset(folder)
 
 
+@pytest.fixture(scope="module")
+def sections(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
+    """Three maps with lanes that are cut, each of which goes by the name of another."""
+    folder = tmp_path_factory.mktemp("sections") / "d"
+    made = labels(random.Random(7), 150)
+    maps = {f"map{number}": called_otherwise(CUT.features, number) for number in range(3)}
+    recordings = [
+        Recording(f"r{name}", name, tuple(replace(each, recording=f"r{name}", map=name) for each in made[number::3]))
+        for number, name in enumerate(maps)
+    ]
+    write_dataset(folder, iter(recordings), maps, name="d")
+    return open_dataset(folder)
+
+
 def verdicts(dataset: Dataset, text: str, options: MatchOptions, **how: bool) -> dict[str, str]:
     query = Query(dataset, Source("p.scenic", text), QueryOptions(options, **how))
     return {each.frame: type(each.verdict).__name__ for each in query.results()}
 
 
-def check(dataset: Dataset, seed: int, asked_of: Callable[[random.Random], str] = question) -> int:
+def check(
+    dataset: Dataset, seed: int, asked_of: Callable[[random.Random], str] = question, network: Network = STREET
+) -> int:
     """How many frames match; each way of asking says the same."""
     draw = random.Random(seed)
     text, options = asked_of(draw), MatchOptions(tolerance=draw.choice(TOLERANCES), timeout_s=5.0)
     try:
-        scenario = prepare_scenario(compile_scenario(Source("p.scenic", text), STREET))
+        scenario = prepare_scenario(compile_scenario(Source("p.scenic", text), network))
     except ScenarioError:
         return 0
     matcher = Matcher(scenario, options)
@@ -412,6 +452,32 @@ def test_sql_over_any_map_follows_the_lists_of_each(
     seeds = (seed for seed in itertools.count() if abstract(named, listed_question(random.Random(seed))))
     found = [check(named, seed, listed_question) for seed in itertools.islice(seeds, rounds(60))]
     assert sum(found) > 0
+
+
+OF_SECTIONS = (
+    "ego.laneSection", "ego.laneSection.laneToLeft", "ego.laneSection.laneToRight", "Uniform(*ego.lane.sections)",
+    "Uniform(*ego.laneSection.adjacentLanes)", "ego.laneSection.laneToRight.laneToRight",
+)  # fmt: skip
+
+
+def section_question(draw: random.Random) -> str:
+    """A program that asks for who is in a section of a lane, and goes its way."""
+    place = draw.choice(OF_SECTIONS)
+    apart = draw.choice(["", "", "\nrequire 3 < (distance to other) < 20", "\nrequire other.lane is not ego.lane"])
+    return f"{HEAD}other = new Car {draw.choice(['on', 'in'])} {place}{apart}\n"
+
+
+def test_sql_over_any_map_compares_with_the_way_of_each_section(
+    sections: Dataset, rounds: Callable[[int], int], monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(run, "MAPS_KEPT", 1)
+    assert all(abstract(sections, section_question(random.Random(seed))) for seed in range(8))
+    found = [check(sections, seed, section_question, CUT) for seed in range(rounds(40))]
+    assert sum(found) > 0
+
+
+def test_sql_over_one_map_compares_with_the_way_of_each_section(sections: Dataset, rounds: Callable[[int], int]):
+    assert sum(check(sections, seed, section_question, CUT) for seed in range(rounds(24))) > 0
 
 
 @pytest.mark.parametrize(
