@@ -18,6 +18,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from unittest.mock import patch
 
@@ -69,6 +70,14 @@ def one_recording(samples: int, cars: int) -> RecordingColumns:
         times_us=[100_000 * number for number in range(samples)], params=none, egos=egos, objects=objects,
         object_counts=np.full(samples, cars), sensor_counts=np.zeros(samples, np.int64), channels=[], paths=[],
     )  # fmt: skip
+
+
+def driving_on(samples: int) -> Iterator[RecordingColumns]:
+    """Recordings of traffic, each of which begins where the ego of the last one ended."""
+    for number, each in enumerate(recordings(samples)):
+        egos, objects = each.egos, each.objects
+        ahead = number * (float(egos.y[-1]) + 1)
+        yield replace(each, egos=replace(egos, y=egos.y + ahead), objects=replace(objects, y=objects.y + ahead))
 
 
 def programs() -> Iterator[tuple[str, str, float | None]]:
@@ -152,7 +161,7 @@ def main() -> None:
                 )
         longest = max(given.samples)
         pieces = max(longest // 200, 1)
-        traffic = glued(recordings(200 * pieces), pieces, apart=False)
+        traffic = glued(driving_on(200 * pieces), pieces, apart=False)
         made = {"few": [one_recording(40, 8)], "cars": [one_recording(longest, 8)], "little": recordings(200),
                 "traffic": traffic}  # fmt: skip
         for what, some in made.items():
