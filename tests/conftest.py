@@ -45,7 +45,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(pytest.mark.timeout(_HANGS_S))
 
 
-_FEWER = 16
+_FEWER = 24
 """How many times fewer rounds a sweep makes where slow tests are left out."""
 
 

@@ -66,7 +66,7 @@ def test_pages_for_users_name_only_options_that_there_are(page):
     assert set(re.findall(r"(?<![\w-])--[a-z][a-z0-9-]+", PAGES[page])) <= known
 
 
-OTHERS = {"scenicq/docs/CONTRIBUTING.md": {"--spec"}}
+OTHERS = {"scenicq/docs/CONTRIBUTING.md": {"--spec"}, "scenicq/docs/results.md": {"--files-from"}}
 """Options of other programs, by page."""
 
 

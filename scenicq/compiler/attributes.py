@@ -217,6 +217,9 @@ def _of_instance(run: Interpreter, value: Instance, name: str, span: Span) -> Mo
             return attribute(run, found, "opposite", span) if place is not name else found
     if name == "visibleRegion":
         return operators.visible_region(value, span)
+    if name == "canSee":
+        # what is given besides says what hides things, and here nothing does
+        return Builtin(name, lambda span, other, *_, **__: operators.can_see(value, other, span))
     if value.index is not None and (name in _OF_BOXES or (name == "distanceTo" and run.version == 3)):
         return REGION_METHODS[name](operators.object_box(value, span))
     if name == "distanceTo":
@@ -270,6 +273,9 @@ def _of_node(value: Node, name: str, span: Span) -> ModelValue:
             return build.coordinate(value, "xy".index(name), span)
         case "vector", "z":
             return 0.0
+        case "vector", "coords":
+            # what `project` gives is a point of a geometry library, with a list of its coordinates
+            return [(build.coordinate(value, 0, span), build.coordinate(value, 1, span))]
         case "vector", "normalized":
             one = build.arithmetic(ArithmeticOp.DIV, build.constant(1.0), build.norm(value, span), span=span)
             return Builtin(name, lambda span: build.scale(value, one, span))

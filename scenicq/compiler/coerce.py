@@ -29,6 +29,7 @@ __all__ = [
     "observed_property",
     "property_node",
     "read_over_time",
+    "reads_over_time",
     "to_boolean",
     "to_field",
     "to_heading",
@@ -76,6 +77,11 @@ def read_over_time(*, current: bool = True) -> Generator[None]:
         yield
     finally:
         _OVER_TIME.reset(token)
+
+
+def reads_over_time() -> bool:
+    """Whether a condition over time is evaluated, or what a behavior or monitor does."""
+    return _OVER_TIME.get()
 
 
 def property_node(instance: Instance, name: str, span: Span | None) -> ModelValue:

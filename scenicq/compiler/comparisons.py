@@ -25,7 +25,7 @@ from scenicq.compiler.values import (
 from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.forest.nodes import CompareOp, Constant, Node, Select
-from scenicq.geometry.abstract_map import AbstractElement, NeedsMapError
+from scenicq.geometry.abstract_map import AbstractElement, AbstractList, NeedsMapError
 from scenicq.geometry.elements import Maneuver, NetworkElement
 from scenicq.syntax.hints import condition_hint
 
@@ -189,6 +189,11 @@ def _membership(op: str, left: ModelValue, right: ModelValue, span: Span) -> Mod
         return negated(inside)
     if isinstance(right, str) and isinstance(left, str):
         return (left in right) == (op == "in")
+    if isinstance(right, AbstractList):
+        same = _same_choice(left, cast(ModelValue, right.some(span)), span)
+        if same is None or isinstance(same, bool):
+            raise NeedsMapError
+        return negated(same)
     if isinstance(right, list | tuple | dict | set | range):
         items = list(cast("list[ModelValue]", right))
         if _is_special(left) or (not is_flat(items) and any(map(_is_special, items))):

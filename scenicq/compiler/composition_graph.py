@@ -307,6 +307,9 @@ class CompositionGraph(ProcessGraph):
                 return self._ended(state, node.span)
             case ast.Take():
                 raise fail("parse-error", "only behaviors take actions", node.span, "this composes scenarios")
+            case ast.Try() | ast.TryInterrupt() if node.handlers or node.final:
+                # what a scenario raises while others run beside it, Scenic leaves half done
+                raise self.refusal((node.handlers[0] if node.handlers else node).span)
             case ast.DynamicDefinition() | ast.Model() | ast.Param() | ast.Mutate() | ast.RequireMonitor():
                 raise fail("unsupported-construct", "this cannot stand in a compose block", node.span, "",
                            ("write it in the `setup` block",))  # fmt: skip

@@ -17,6 +17,7 @@ from scenicq.geometry.abstract_map import (
     AbstractNetwork,
     AbstractOccupancy,
     LinkedFrom,
+    LinkStep,
     NeedsMapError,
 )
 from scenicq.geometry.elements import Intersection, Lane, Maneuver, NetworkElement
@@ -115,8 +116,8 @@ LOOKUPS: dict[str, tuple[str, Callable[[Network], list[list[LookupEntry]]]]] = {
 _FOUND_IN: dict[str, tuple[str, tuple[LinkedFrom, ...]]] = {
     "laneAt": ("lane", (LinkedFrom("lane"),)),
     "laneSectionAt": ("lane_section", (LinkedFrom("lane_section"),)),
-    "laneGroupAt": ("lane_group", (LinkedFrom("lane", ("group",)), LinkedFrom("lane_group"))),
-    "roadAt": ("road", (LinkedFrom("lane", ("road",)), LinkedFrom("road"))),
+    "laneGroupAt": ("lane_group", (LinkedFrom("lane", (LinkStep("group"),)), LinkedFrom("lane_group"))),
+    "roadAt": ("road", (LinkedFrom("lane", (LinkStep("road"),)), LinkedFrom("road"))),
     "intersectionAt": ("intersection", (LinkedFrom("intersection"),)),
     "crossingAt": ("crossing", (LinkedFrom("crossing"),)),
     "sidewalkAt": ("sidewalk", (LinkedFrom("sidewalk"),)),

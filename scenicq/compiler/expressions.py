@@ -16,7 +16,7 @@ from scenicq.compiler.attributes import attribute
 from scenicq.compiler.comparisons import binary, compare, iterate, symbolic
 from scenicq.compiler.coroutines import LibraryCall, LibraryName
 from scenicq.compiler.courses import option_of
-from scenicq.compiler.distributions import interval
+from scenicq.compiler.distributions import DISTRIBUTIONS, interval
 from scenicq.compiler.environment import FIRST_NAMES, Environment
 from scenicq.compiler.items import items_of, length_of, subscript
 from scenicq.compiler.known_properties import as_constant, known_truth
@@ -39,6 +39,7 @@ from scenicq.compiler.values import (
     is_node,
 )
 from scenicq.errors import Span
+from scenicq.geometry.abstract_map import AbstractList, NeedsMapError
 from scenicq.geometry.elements import NetworkElement
 from scenicq.syntax import ast
 
@@ -55,6 +56,7 @@ class _Arguments:
         self.positional: list[ModelValue] = []
         self.named: dict[str, ModelValue] = {}
         self.choice: Choice | None = None
+        self.drawn: AbstractList | None = None
 
 
 def _arguments(run: Interpreter, items: tuple[ast.Argument, ...], scope: Environment) -> _Arguments:
@@ -62,7 +64,9 @@ def _arguments(run: Interpreter, items: tuple[ast.Argument, ...], scope: Environ
     for item in items:
         value = evaluate(run, item.value, scope)
         if item.star == "*":
-            if isinstance(value, Choice) and len(items) == 1:
+            if isinstance(value, AbstractList) and len(items) == 1:
+                found.drawn = value
+            elif isinstance(value, Choice) and len(items) == 1:
                 found.choice = value
             else:
                 found.positional += items_of(run, value, item.span)
@@ -132,6 +136,10 @@ def _told(
 def _call(run: Interpreter, node: ast.Call, scope: Environment) -> ModelValue:
     function = evaluate(run, node.function, scope)
     arguments = _arguments(run, node.arguments, scope)
+    if arguments.drawn is not None:
+        if not isinstance(function, Builtin) or function.call is not DISTRIBUTIONS["Uniform"]:
+            raise NeedsMapError
+        return cast(ModelValue, arguments.drawn.draw(node.span))
     if arguments.choice is not None:
         return _call_each(run, function, arguments.choice, node.span)
     return call(run, function, arguments.positional, arguments.named, node.span)

@@ -12,7 +12,7 @@ from typing import Any, assert_never, cast
 from scenicq.compiler.arithmetic import number_error
 from scenicq.compiler.assignment import assign
 from scenicq.compiler.classes import bind_arguments, define_class, refuse_decorators
-from scenicq.compiler.coerce import to_region, to_scalar
+from scenicq.compiler.coerce import reads_over_time, to_region, to_scalar
 from scenicq.compiler.comparisons import binary, iterate
 from scenicq.compiler.coroutines import (
     CoroutineCall,
@@ -164,6 +164,9 @@ class Interpreter:
             value.label = name
         if name == "workspace":
             self.workspace = to_region(value, span)
+        if name in scope.shared and scope.shared[name].is_module and reads_over_time():
+            raise fail("unsupported-construct", f"`{name}` of the program cannot be given a value over time", span,
+                       "called while a recording is followed", ("keep it in a variable of the behavior",))  # fmt: skip
         scope.set(name, value)
 
     def _set_ego(self, value: ModelValue, span: Span) -> None:

@@ -5,7 +5,6 @@ Maps cut lanes as they like, often after a few metres.
 
 from __future__ import annotations
 
-import heapq
 import math
 from typing import TYPE_CHECKING
 
@@ -16,6 +15,7 @@ from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.forest.nodes import AheadInLanes, Constant, Node
 from scenicq.geometry.elements import Lane
+from scenicq.geometry.lanes_ahead import lanes_from
 from scenicq.geometry.regions import PolygonSet
 
 if TYPE_CHECKING:
@@ -60,26 +60,10 @@ def lanes_ahead(run: Interpreter, lane: Lane, distance: ModelValue, span: Span) 
     """
     if isinstance(distance, bool) or not isinstance(distance, int | float) or not math.isfinite(distance):
         raise fail("wrong-type", "`lanesAhead` needs a known number of metres", span, f"this is {describe(distance)}")
-    begins: dict[Lane, float] = {lane: 0.0}
-    waiting = [(0.0, 0, lane)]
-    while waiting:
-        run.budget.step(span)
-        far, _, now = heapq.heappop(waiting)
-        if far > begins[now]:
-            continue
-        end = far + (0.0 if now is lane else _length(now))
-        for each in now.successors:
-            if end <= distance and end < begins.get(each, math.inf):
-                begins[each] = end
-                heapq.heappush(waiting, (end, len(begins), each))
+    begins = lanes_from(lane, distance, lambda: run.budget.step(span))
     return PolygonSet(
         tuple(each.polygon for each in begins),
         f"{lane.name} and what it leads to",
         run.network.roadDirection,
         tuple(each.id for each in begins),
     )
-
-
-def _length(lane: Lane) -> float:
-    """Metres along a lane; half of what runs around it where the map has no centreline."""
-    return lane.polygon.length / 2 if lane.centerline is None else sum(line.length for line in lane.centerline.lines)

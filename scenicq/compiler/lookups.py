@@ -14,15 +14,15 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, cast
 
 from scenicq.compiler.coerce import property_node, to_heading, to_node, to_vector
-from scenicq.compiler.element_lookups import LOOKUPS, LookupTable, own, ways_at, ways_everywhere
+from scenicq.compiler.element_lookups import LOOKUPS, AbstractLookup, LookupTable, own, ways_at, ways_everywhere
 from scenicq.compiler.known_properties import as_constant
-from scenicq.compiler.values import Choice, Instance, ModelValue, fail
+from scenicq.compiler.values import Builtin, Choice, Instance, ModelValue, fail
 from scenicq.errors import Span
 from scenicq.forest import build
-from scenicq.forest.nodes import GOING, LAST_LANE, Constant, Node, Vector
-from scenicq.geometry.abstract_map import NeedsMapError
+from scenicq.forest.nodes import GOING, LAST_LANE, Constant, Node, Select, Undefined, Vector
+from scenicq.geometry.abstract_map import AbstractArea, AbstractList, AbstractOccupancy, NeedsMapError
 from scenicq.geometry.elements import Intersection, NetworkElement
-from scenicq.geometry.links import find_link
+from scenicq.geometry.links import AHEAD, AHEAD_M, LISTS, find_link
 from scenicq.geometry.network import Network
 from scenicq.geometry.occupancy import ElementAtPoint
 
@@ -106,21 +106,50 @@ def follow_link(run: Interpreter, choice: Choice, name: str, span: Span) -> Mode
     known = run.lookups.abstract.get(id(choice.index))
     if known is None or len(choice.options) != _WITH_NOTHING or choice.options[0] is not known.element:
         raise NeedsMapError
-    found = find_link(known.element.kind, name)
-    if found is None or choice.options[1] is not None:
-        raise NeedsMapError
-    link, needed = found
-    key = (known.key, link)
-    where = known.element.found.through(link)
-    table = run.lookups.table(key, lambda: LookupTable.of_any(where, known.table.family, run.network))
-    if not table.options:
+    kind, there = known.element.kind, known.element.found
+    found = find_link(kind, name)
+    listed = name in LISTS.get(kind, {})
+    if choice.options[1] is not None or not (found or listed or (kind, name) == ("lane", AHEAD)):
         raise NeedsMapError
     # None has no attributes
     run.excluded.add(choice.index, [1], _WITH_NOTHING, span)
+    if found is not None:
+        link, needed = found
+        return _linked(run, known, (known.key, link), there.through(link), span, needed=needed)
+    if listed:
+        inside = there.through(name)
+
+        def draw(span: Span) -> ModelValue:
+            # each draw is one of its own
+            key = (known.key, name, len(run.lookups.tables))
+            return _linked(run, known, key, there.through(name, is_drawn=True), span, needed=True)
+
+        return AbstractList(inside, draw, lambda span: _linked(run, known, (known.key, name), inside, span))
+    return Builtin(name, lambda span, distance=50: _area_ahead(run, choice, there, distance, span))
+
+
+def _linked(
+    run: Interpreter, known: AbstractLookup, key: object, found: AbstractOccupancy, span: Span, *, needed: bool = False
+) -> Choice:
+    """What an element leads to, as a look-up where it lies."""
+    table = run.lookups.table(key, lambda: LookupTable.of_any(found, known.table.family, run.network))
+    if not table.options:
+        raise NeedsMapError
     index = run.lookups.index(key, table, known.place, known.going, span)
     if needed:
         run.excluded.add(index, [1], _WITH_NOTHING, span)
     return Choice(index, (*run.lookups.options(table, index), None), _WITH_NOTHING)
+
+
+def _area_ahead(run: Interpreter, choice: Choice, there: AbstractOccupancy, distance: ModelValue, span: Span) -> Node:
+    """What `lanesAhead` of the lane at a place gives, over an abstract map."""
+    number = as_constant(run, distance)
+    number = number.value if isinstance(number, Constant) else number
+    if isinstance(number, bool) or not isinstance(number, int | float) or not 0 <= number <= AHEAD_M:
+        raise NeedsMapError
+    area = AbstractArea(there.through(AHEAD, within=float(number)), run.network.roadDirection)
+    nowhere = Undefined("there is no such element here")
+    return Select(choice.index, (build.constant(area, span), build.constant(nowhere, span)), span=span)
 
 
 def among(

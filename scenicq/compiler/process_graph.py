@@ -31,6 +31,8 @@ from scenicq.compiler.process_states import (
     BlockFrame,
     CallFrame,
     Directs,
+    ExceptFrame,
+    FinalFrame,
     Following,
     ForFrame,
     GraphGuards,
@@ -44,6 +46,7 @@ from scenicq.compiler.process_states import (
     PickBehavior,
     ProcessFrame,
     ProcessState,
+    Raise,
     TimerStarts,
     TogetherFrame,
     TryFrame,
@@ -55,6 +58,7 @@ from scenicq.compiler.process_states import (
     free_timer,
     timers_of,
 )  # fmt: skip
+from scenicq.compiler.raised import read_handlers, violation
 from scenicq.compiler.scoping import bound_names
 from scenicq.compiler.values import Choice, DelayedValue, Function, Instance, ModelValue, describe, fail
 from scenicq.errors import Span
@@ -147,7 +151,20 @@ class ProcessGraph:
     # --- the graph
 
     def follow(self, start: ProcessState) -> None:
-        """Follow it from its start."""
+        """Follow it from its start.
+
+        Raises:
+            ScenarioError: unsupported-construct, where it changes what all of the program sees.
+        """
+        around = [frame.call.of.environment for frame in start.frames if isinstance(frame, CallFrame)]
+        shared = {} if not around else _containers(cast(Environment, around[0]).module)
+        self._follow(start)
+        for name, (value, before) in shared.items():
+            if _contents(value) != before:
+                raise fail("unsupported-construct", f"`{name}` of the program cannot be changed over time", self.span,
+                           f"changed by this {self.word}", (f"keep it in a variable of the {self.word}",))  # fmt: skip
+
+    def _follow(self, start: ProcessState) -> None:
         self.number(start)
         with read_over_time(), forbid_courses(self.run):
             while self._todo:
@@ -199,7 +216,8 @@ class ProcessGraph:
                 else:
                     step = Test(self.atom(found.node), self.step_number(found.then), self.step_number(found.otherwise))
                 for guard, span in found.guards:
-                    step = Test(self.atom(guard), self.add(step), self.add(Reject(span)))
+                    lacking = Reject(span) if found.lacking is None else found.lacking
+                    step = Test(self.atom(guard), self.add(step), self.step_number(lacking))
                 return step
             case Ways():
                 return Choose(tuple(dict.fromkeys(map(self.step_number, found.options))))
@@ -266,7 +284,9 @@ class ProcessGraph:
         if key not in self._asked:
             self._asked[key] = self.excluding(lambda: split_by_course(run, evaluated, wanted.span))
         node, guards = self._asked[key]
-        return self.test(state, node, guards, then, otherwise, wanted.span)
+        # what a guard asks for and is not there violates it
+        lacking = otherwise if state.guards else self.lacking(state)
+        return self.test(state, node, guards, then, otherwise, wanted.span, lacking)
 
     def excluding(self, work: Callable[[], _Result]) -> tuple[_Result, GraphGuards]:
         """What is worked out, with what it excludes."""
@@ -274,16 +294,48 @@ class ProcessGraph:
         return found, tuple(excluded)
 
     def test(
-        self, state: ProcessState, node: Node, guards: GraphGuards, then: Following, otherwise: Following, span: Span
-    ) -> Following:
+        self, state: ProcessState, node: Node, guards: GraphGuards, then: Following, otherwise: Following, span: Span,
+        lacking: Following | None = None,
+    ) -> Following:  # fmt: skip
         """Go on in one of two ways by a condition, whose random numbers are drawn."""
 
         def tested(settled: ModelValue) -> Following:
             if isinstance(settled, Constant) and not guards:
                 return then if settled.value else otherwise
-            return GuardedTest(cast(Node, settled), guards, then, otherwise)
+            return GuardedTest(cast(Node, settled), guards, then, otherwise, lacking=lacking)
 
         return self.with_drawn(state, node, span, tested)
+
+    def lacking(self, state: ProcessState) -> Following | None:
+        """How a state goes on where something that is asked for is not there; None where the run is rejected."""
+        found = self.raise_at(state, "RejectionException", self.span)
+        return None if isinstance(found, Reject) else found
+
+    def raise_at(self, state: ProcessState, raised: str, span: Span) -> Following:
+        """Raise something: the innermost `except` that catches it goes on, else the run is rejected."""
+        # what a `try` asks before it goes on inside is raised at the `try`
+        end = state.resumed if state.resumed >= 0 else len(state.frames)
+        for at in reversed(range(end)):
+            frame = state.frames[at]
+            below = replace(state, frames=state.frames[:at], resumed=-1, asked=-1, guards=(), of=-1)
+            if isinstance(frame, FinalFrame):
+                return self.push(below, BlockFrame((*frame.body, Raise(raised, span))))
+            caught = [each for each in frame.handlers if each.catches(raised)] if isinstance(frame, ExceptFrame) else []
+            if caught:
+                handler = caught[0]
+                if handler.variable is not None:
+                    below = self.with_variable(below, handler.variable, raised)
+                return self.push(below, BlockFrame(handler.body))
+        return Reject(span)
+
+    def with_variable(self, state: ProcessState, name: str, value: ModelValue) -> ProcessState:
+        """A state in which a variable of the innermost call has a value."""
+        number = self.call_of(state)
+        frame = cast(CallFrame, state.frames[number])
+        names = tuple(sorted({**dict(frame.names), name: self.values.hold(value)}.items(), key=lambda each: each[0]))
+        return replace(
+            state, frames=(*state.frames[:number], CallFrame(frame.call, names), *state.frames[number + 1 :])
+        )
 
     def unknown(self, leaf: Leaf, state: ProcessState, span: Span, targets: tuple[str, ...]) -> Feature:
         """What stands for a number that is drawn and not known."""
@@ -305,7 +357,7 @@ class ProcessGraph:
         if names.shared:
             raise self.refusal(node.span)
         after = self.with_names(rest, number, names, node.span)
-        return ask_guards(guards, after)
+        return ask_guards(guards, after, self.lacking(rest))
 
     def with_names(self, state: ProcessState, number: int, names: Environment, span: Span) -> Following:
         """A state with the variables of a call as they are now; random numbers among them are drawn."""
@@ -341,7 +393,8 @@ class ProcessGraph:
             first, *others = state.guards
             assert first.operand is not None
             then = replace(state, guards=tuple(others), of=state.of if others else -1)
-            return self.ask(state, first.operand, then, Reject(first.span), state.of)
+            broken = self.raise_at(state, violation(first), first.span)
+            return self.ask(state, first.operand, then, broken, state.of)
         if state.resumed >= 0:
             return self.resume(state)
         if not state.frames:
@@ -369,6 +422,10 @@ class ProcessGraph:
                 return below
             case LibraryFrame():
                 return self.library(state, frame, below)
+            case ExceptFrame():
+                return self.push(below, BlockFrame(frame.orelse))
+            case FinalFrame():
+                return self.push(below, BlockFrame(frame.body))
             case TogetherFrame():
                 raise fail("unsupported-construct", f"a {self.word} runs no scenarios", self.span, "this one does")
             case TryFrame():
@@ -528,7 +585,7 @@ class ProcessGraph:
         if contract.over is not None and frame.lasted >= contract.least_steps:
             found = self.test(state, contract.over, (), following, found, self.span)
         asked = guards if not frame.phase and not frame.lasted else ()
-        found = ask_guards(asked, found)
+        found = ask_guards(asked, found, self.lacking(below))
         return replace(found, loose=True) if isinstance(found, GuardedTest) else found
 
     def contracts_of(self, held: VariableValue) -> tuple[tuple[Contract, ...], GraphGuards]:
@@ -581,21 +638,20 @@ class ProcessGraph:
             case ast.DynamicStatement(kind="terminate" | "terminate simulation", operand=None):
                 return Terminate(node.span)
             case ast.DynamicStatement(kind="abort"):
-                return self.leave(state, node.span, TryFrame)
+                return self.leave(state, node, self.innermost(state, node.span, TryFrame))
             case ast.Global() if self.only_reads(state, node):
                 return rest
             case ast.Global() | ast.Nonlocal():
                 raise self.refusal(node.span)
-            case ast.TryInterrupt() if not (node.handlers or node.orelse or node.final):
-                interrupts = tuple(reversed(node.interrupts))
-                frame = TryFrame(
-                    tuple(each.condition for each in interrupts), tuple(each.body for each in interrupts), node.body
-                )
-                return replace(self.push(rest, frame), resumed=len(rest.frames), asked=0)
+            case ast.Try() | ast.TryInterrupt():
+                return self.attempt(state, node, rest)
+            case Raise():
+                return self.raise_at(rest, node.raised, node.span)
             case ast.Require(probability=None):
-                return self.ask(state, node.condition, rest, Reject(node.span))
+                broken = self.raise_at(rest, "RejectSimulationException", node.span)
+                return self.ask(state, node.condition, rest, broken)
             case ast.Assert():
-                return self.ask(state, node.test, rest, Reject(node.span))
+                return self.ask(state, node.test, rest, self.raise_at(rest, "AssertionError", node.span))
             case ast.If():
                 return self.branch(state, node, 0, rest)
             case ast.While():
@@ -604,22 +660,18 @@ class ProcessGraph:
                 value, guards = self.evaluate(state, node.iterable)
                 items = tuple([self.values.hold(each) for each in items_of(self.run, value, node.iterable.span)])
                 found = self.push(rest, ForFrame(node, self.items(items)))
-                return ask_guards(guards, found)
+                return ask_guards(guards, found, self.lacking(rest))
             case ast.Break():
-                frames = self.leave(state, node.span, WhileFrame, ForFrame).frames
-                return replace(state, frames=frames)
+                return self.leave(state, node, self.innermost(state, node.span, WhileFrame, ForFrame))
             case ast.Continue():
-                frames = self.leave(state, node.span, WhileFrame, ForFrame, keep=True).frames
-                return replace(state, frames=frames)
+                return self.leave(state, node, self.innermost(state, node.span, WhileFrame, ForFrame) + 1)
             case ast.Return():
-                return replace(state, frames=state.frames[: self.call_of(state)])
+                return self.leave(state, node, self.call_of(state))
             case (
                 ast.Assign() | ast.AugmentedAssign() | ast.AnnotatedAssign() | ast.ExpressionStatement()
                 | ast.FunctionDef()
             ):  # fmt: skip
                 return self.simple(state, node, rest)
-            case ast.TryInterrupt() | ast.Try() if node.handlers:
-                raise self.refusal(node.handlers[0].span)
             case _:
                 raise self.refusal(node.span)
 
@@ -651,15 +703,38 @@ class ProcessGraph:
         other = self.push(rest, BlockFrame((others,))) if others.branches else self.push(rest, BlockFrame(node.orelse))
         return self.ask(state, branch.test, self.push(rest, BlockFrame(branch.body)), other)
 
-    def leave(self, state: ProcessState, span: Span, *kinds: type, keep: bool = False) -> ProcessState:
-        """A state in which the innermost frame of a kind of the call is left, or where it goes on."""
+    def attempt(self, state: ProcessState, node: ast.Try | ast.TryInterrupt, rest: ProcessState) -> Following:
+        """Begin a `try`."""
+        if node.final:
+            rest = self.push(rest, FinalFrame(node.final))
+        if node.handlers:
+            handlers = read_handlers(node.handlers, self.scope(state, self.call_of(state)))
+            rest = self.push(rest, ExceptFrame(handlers, node.orelse))
+        if isinstance(node, ast.Try):
+            return self.push(rest, BlockFrame(node.body))
+        interrupts = tuple(reversed(node.interrupts))
+        frame = TryFrame(
+            tuple(each.condition for each in interrupts), tuple(each.body for each in interrupts), node.body
+        )
+        return replace(self.push(rest, frame), resumed=len(rest.frames), asked=0)
+
+    def innermost(self, state: ProcessState, span: Span, *kinds: type) -> int:
+        """The number of the innermost frame of a kind in the call."""
         for number in reversed(range(len(state.frames))):
             frame = state.frames[number]
             if isinstance(frame, kinds) and not (isinstance(frame, TryFrame) and frame.ends):
-                return replace(state, frames=state.frames[: number + keep])
+                return number
             if isinstance(frame, CallFrame):
                 break
         raise fail("parse-error", f"`{span.text.split()[0]}` has nothing to leave here", span, "leaves nothing")
+
+    def leave(self, state: ProcessState, node: ast.Statement, number: int) -> ProcessState:
+        """A state without the frames from a number on; before that a `finally` among them is done, and leaves, too."""
+        for at in reversed(range(number, len(state.frames))):
+            frame = state.frames[at]
+            if isinstance(frame, FinalFrame):
+                return replace(state, frames=(*state.frames[:at], BlockFrame((*frame.body, node))))
+        return replace(state, frames=state.frames[:number])
 
     def take(self, state: ProcessState, node: ast.Take, rest: ProcessState) -> Following:
         """Take actions."""
@@ -679,7 +754,7 @@ class ProcessGraph:
                 asked += guards
                 contracts += [contract] if contract is not None else []
             found = self.waits(rest, node.span, contracts)
-            return ask_guards(tuple(asked), found)
+            return ask_guards(tuple(asked), found, self.lacking(rest))
 
         return self.with_drawn(state, values, node.span, taken)
 
@@ -748,7 +823,7 @@ class ProcessGraph:
             return self.run_limited(state, rest, (inner,), node.until, node.duration, node.unit)
 
         after = self.with_drawn(state, values, node.span, done)
-        return ask_guards(tuple(excluded), after)
+        return ask_guards(tuple(excluded), after, self.lacking(rest))
 
     def as_done(self, value: ModelValue, span: Span) -> ModelValue:
         """What is done, as a call."""
@@ -826,7 +901,7 @@ class ProcessGraph:
             return self.ask_enabled(state, value, yes, no)
         enabled = [number for number, each in enumerate(node.enabled) if each]
         if not enabled:
-            return Reject(node.span)
+            return self.raise_at(rest, "RejectSimulationException", node.span)
         ways: list[ProcessState] = []
         for number in enabled:
             others = (*node.options[:number], *node.options[number + 1 :])
@@ -840,7 +915,7 @@ class ProcessGraph:
         within = self.push_call(state, call)
         for guard in reversed(call.of.guards("precondition") + call.of.guards("invariant")):
             assert guard.operand is not None
-            found = self.ask(within, guard.operand, found, no)
+            found = self.ask(replace(within, guards=(guard,)), guard.operand, found, no)
         return found
 
 
@@ -912,3 +987,37 @@ def has_circle(steps: Sequence[ProcessStep], loose: set[int]) -> bool:
             if not waiting[target]:
                 free.append(target)
     return left > 0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Same:
+    """A value, which is like no other one."""
+
+    value: ModelValue
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Same) and other.value is self.value
+
+    def __hash__(self) -> int:
+        return id(self.value)
+
+
+def _containers(module: Environment) -> dict[str, tuple[ModelValue, Hashable]]:
+    """The lists, dictionaries and sets that have a name in a file, with what they contain."""
+    return {
+        name: (value, _contents(value)) for name, value in module.names.items() if isinstance(value, list | dict | set)
+    }
+
+
+def _contents(value: ModelValue) -> Hashable:
+    """What tells whether a value has been changed: two are alike that contain the same values."""
+    match value:
+        case list():
+            return tuple([_contents(each) for each in cast("list[ModelValue]", value)])
+        case dict():
+            items = cast("dict[ModelValue, ModelValue]", value).items()
+            return tuple([(key, _contents(each)) for key, each in items])
+        case set():
+            return frozenset(map(id, cast("set[ModelValue]", value)))
+        case _:
+            return _Same(value)

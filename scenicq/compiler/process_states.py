@@ -8,6 +8,7 @@ from typing import TypeAlias
 
 from scenicq.compiler.coroutines import CoroutineCall
 from scenicq.compiler.local_values import VariableValue
+from scenicq.compiler.raised import Handler
 from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.forest.nodes import Node
@@ -33,6 +34,8 @@ __all__ = [
     "CallFrame",
     "Directs",
     "EnterScenarios",
+    "ExceptFrame",
+    "FinalFrame",
     "Following",
     "ForFrame",
     "GraphGuards",
@@ -46,6 +49,7 @@ __all__ = [
     "PickBehavior",
     "ProcessFrame",
     "ProcessState",
+    "Raise",
     "RunningScenario",
     "ScenarioStep",
     "TimerStarts",
@@ -103,6 +107,19 @@ class Idle:
 
 
 @dataclass(frozen=True, slots=True)
+class Raise:
+    """Raises something again, after a `finally`.
+
+    Attributes:
+        raised: What.
+        span: Where it was raised.
+    """
+
+    raised: str
+    span: Span
+
+
+@dataclass(frozen=True, slots=True)
 class EnterScenarios:
     """Begins scenarios one after the other; when all have begun, they run side by side.
 
@@ -117,7 +134,9 @@ class EnterScenarios:
     begun: tuple[RunningScenario, ...] = ()
 
 
-GraphStatement: TypeAlias = "ast.Statement | AskInvariants | BeginBehavior | PickBehavior | Idle | EnterScenarios"
+GraphStatement: TypeAlias = (
+    "ast.Statement | AskInvariants | BeginBehavior | PickBehavior | Idle | Raise | EnterScenarios"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,6 +222,26 @@ class TryFrame:
 
 
 @dataclass(frozen=True, slots=True)
+class ExceptFrame:
+    """A `try` with handlers: what frames above this one raise, they may catch.
+
+    Attributes:
+        handlers: Its handlers.
+        orelse: What is done where nothing was raised.
+    """
+
+    handlers: tuple[Handler, ...]
+    orelse: tuple[ast.Statement, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class FinalFrame:
+    """A `try` with a `finally`: whatever leaves frames above this one does its statements first."""
+
+    body: tuple[ast.Statement, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class RunningScenario:
     """A scenario that another one runs.
 
@@ -239,7 +278,10 @@ class TogetherFrame:
     stage: str = "begins"
 
 
-ProcessFrame: TypeAlias = "BlockFrame | WhileFrame | ForFrame | CallFrame | LibraryFrame | TryFrame | TogetherFrame"
+ProcessFrame: TypeAlias = (
+    "BlockFrame | WhileFrame | ForFrame | CallFrame | LibraryFrame"
+    " | TryFrame | ExceptFrame | FinalFrame | TogetherFrame"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -277,6 +319,7 @@ class GuardedTest:
         node: The condition.
         guards: What it asks for.
         then, otherwise: How it goes on.
+        lacking: How it goes on without what it asks for; None where the run is rejected.
         loose: Whether a circle through it is none of the program's loops.
     """
 
@@ -285,6 +328,7 @@ class GuardedTest:
     then: Following
     otherwise: Following
     loose: bool = False
+    lacking: Following | None = None
 
 
 GraphGuards: TypeAlias = tuple[tuple[Node, Span], ...]
@@ -354,9 +398,9 @@ def any_of(ways: Sequence[Following]) -> Following:
     return ways[0] if len(ways) == 1 else Ways(tuple(ways))
 
 
-def ask_guards(guards: GraphGuards, then: Following) -> Following:
+def ask_guards(guards: GraphGuards, then: Following, lacking: Following | None = None) -> Following:
     """Ask for what must hold, then go on."""
-    return GuardedTest(build.constant(True), guards, then, then) if guards else then
+    return GuardedTest(build.constant(True), guards, then, then, lacking=lacking) if guards else then
 
 
 def timers_of(state: ProcessState) -> set[int]:

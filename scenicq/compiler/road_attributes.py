@@ -29,7 +29,7 @@ from scenicq.geometry.elements import (
     Sidewalk,
 )
 from scenicq.geometry.network import Network
-from scenicq.geometry.regions import PolygonSet, PolylineSet, Region
+from scenicq.geometry.regions import PolylineSet, Region, union
 from scenicq.geometry.road_direction import along_lines
 from scenicq.geometry.shapes import Shape
 
@@ -124,8 +124,7 @@ def _sidewalks(network: Network, road: Road) -> tuple[Sidewalk, ...]:
 
 
 def _sidewalk_region(network: Network, road: Road) -> ModelValue:
-    own = _sidewalks(network, road)
-    return build.constant(PolygonSet(tuple(each.polygon for each in own), f"sidewalk of {road.id}"))
+    return build.constant(union(*(each.region for each in _sidewalks(network, road))))
 
 
 def _side(element: LongElement, *, left: bool) -> ModelValue:

@@ -59,6 +59,9 @@ def course_of(run: Interpreter, owner: ModelValue, name: str, span: Span) -> Nod
     if COURSE not in owner.properties:
         here, faces = to_vector(owner, span), to_heading(owner, span)
         owner.properties[COURSE] = LaneCourse(here, faces, run.network, run.gap_s, span=span)
+    if owner.index < 0:
+        # the courses of label objects without a role are made as that of the ego is
+        course_of(run, run.ego(span), name, span)
     return to_node(property_node(owner, COURSE, span), span)
 
 

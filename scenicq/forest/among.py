@@ -30,11 +30,13 @@ from scenicq.forest.columns import (
 from scenicq.forest.interpret import Steps, interpret, steps_of
 from scenicq.forest.nodes import ELEMENT, OPEN, RANK, Among, AmongOp, Body, Feature, Leaf, Node
 from scenicq.forest.scenario import Scenario
-from scenicq.forest.walk import postorder
+from scenicq.forest.value_numbers import ValueNumbers
+from scenicq.forest.walk import children, postorder
 from scenicq.number_ranges import expand_ranges
 
 __all__ = [
-    "LABEL_OBJECTS", "LabelElements", "among_column", "asks_others", "concatenate", "properties_of_others", "take_rows",
+    "LABEL_OBJECTS", "LabelElements", "among_column", "asks_each_once", "asks_others", "concatenate",
+    "properties_of_others", "take_rows",
 ]  # fmt: skip
 
 _NO, _MAYBE, _YES = np.int8(0), np.int8(1), np.int8(2)
@@ -67,6 +69,25 @@ LABEL_OBJECTS = (-1, "#objects")
 def asks_others(*roots: Node) -> bool:
     """Whether expressions ask for label objects that may play no role."""
     return any(isinstance(node, Among) for node in postorder(roots))
+
+
+def asks_each_once(root: Node) -> bool:
+    """Whether no two questions that a condition asks of label objects are one, or hang together.
+
+    Kleene's logic then tells of the condition all that is known.
+    """
+    nodes = [*postorder((root,))]
+    uses = dict.fromkeys(map(id, nodes), 0)
+    uses[id(root)] = 1
+    for node in reversed(nodes):
+        for each in children(node):
+            uses[id(each)] += uses[id(node)]
+    asked = [node for node in nodes if isinstance(node, Among)]
+    if any(uses[id(each)] > 1 for each in asked):
+        return False
+    numbers = ValueNumbers()
+    alone = all(each.kind == "boolean" for each in asked)
+    return len(asked) <= 1 or (alone and len({*map(numbers.expression, asked)}) == len(asked))
 
 
 def properties_of_others(scenario: Scenario) -> frozenset[str] | None:

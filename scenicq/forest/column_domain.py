@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, cast
 
@@ -71,7 +71,7 @@ from scenicq.forest.nodes import (
 from scenicq.geometry.angles import azimuth_array, wrap_array
 from scenicq.geometry.boxes import box_polygons
 from scenicq.geometry.containment import covers_many
-from scenicq.geometry.driven_courses import CoursePlace, measure
+from scenicq.geometry.driven_courses import CoursePlace, Measures, measure
 from scenicq.geometry.fields import VectorField
 from scenicq.geometry.measures import MovingBoxes, time_to_collision
 from scenicq.geometry.membership import contains_many, distance_many
@@ -138,6 +138,9 @@ class ColumnDomain:
     pick: Callable[[DirectionAt, NDArray[np.intp]], NDArray[np.intp]]
     most: float = math.inf
     others: Callable[[Among, Sequence[Column]], Column] | None = None
+    _measured: dict[tuple[tuple[int, str, bool], ...], Measures] = field(
+        default_factory=dict["tuple[tuple[int, str, bool], ...]", "Measures"], repr=False
+    )
 
     # --- leaves
 
@@ -338,9 +341,7 @@ class ColumnDomain:
     def _course_coordinate(self, node: CourseCoordinate, courses: CodedValues, args: Sequence[Column]) -> Column:
         places = ColumnPlaces((*args,))
         self._check(len(places.defined), "courses")
-        which: list[int] = places.spread(courses.which)[places.defined].tolist()
-        mine = [cast(CoursePlace, courses.options[number]) for number in which]
-        found = measure(mine, places.points(args[1].data))
+        found = self._measures(node, courses, args, places)
         low, high = (found.end(node.axis, end) for end in (0, 1))
         status, data = places.status.copy(), np.full(places.count, np.nan)
         data[places.defined] = np.clip(high if node.end == 1 else low, -FAR_M, FAR_M)
@@ -348,10 +349,25 @@ class ColumnDomain:
             status[places.defined[low != high]] = UNKNOWN
         return Column(data.reshape(places.shape), status.reshape(places.shape))
 
-    def _direction(self, node: DirectionAt, field: Column, point: Column, *going: Column) -> Column:
-        places = ColumnPlaces((field, point, *going))
+    def _measures(
+        self, node: CourseCoordinate, courses: CodedValues, args: Sequence[Column], places: ColumnPlaces
+    ) -> Measures:
+        """Where points are on courses; what is observed is measured once for along, beside and their ends."""
+        features = (each for each in (node.course, node.point) if isinstance(each, Feature))
+        of = tuple((each.object, each.property, each.current) for each in features)
+        if of in self._measured:
+            return self._measured[of]
+        which: list[int] = places.spread(courses.which)[places.defined].tolist()
+        mine = [cast(CoursePlace, courses.options[number]) for number in which]
+        found = measure(mine, places.points(args[1].data))
+        if len(of) == len(args):
+            self._measured[of] = found
+        return found
+
+    def _direction(self, node: DirectionAt, of: Column, point: Column, *going: Column) -> Column:
+        places = ColumnPlaces((of, point, *going))
         self._check(len(places.defined), "directions")
-        allowed = _allowed(places, field.data, point.data, *(each.data for each in going))
+        allowed = _allowed(places, of.data, point.data, *(each.data for each in going))
         most = max(map(len, allowed), default=1)
         counts = np.zeros(places.count, dtype=np.intp)
         counts[places.defined] = list(map(len, allowed))

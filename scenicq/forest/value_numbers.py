@@ -12,6 +12,7 @@ from typing import cast
 from scenicq.forest.nodes import (
     AheadInLanes,
     Among,
+    AmongOp,
     Arithmetic,
     ArithmeticOp,
     Compare,
@@ -147,8 +148,11 @@ def is_total(node: Node) -> bool:
             return not isinstance(node.value, Undefined)
         case DirectionAt(field=Constant(value=VectorField() as field)):
             return field.reach is None
+        case Among():
+            # there may be nobody who is the nearest
+            return node.op is not AmongOp.NEAREST
         case _:
-            return not isinstance(node, DirectionAt | Among)
+            return not isinstance(node, DirectionAt)
 
 
 def _is_difference(node: Node) -> bool:

@@ -8,28 +8,33 @@ asks for more raises `NeedsMapError`: no list of what depends on a map could be 
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import NoReturn
+from typing import NamedTuple, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
+from scenicq.errors import Span
 from scenicq.geometry.elements import NetworkElement
-from scenicq.geometry.links import LINKS
+from scenicq.geometry.links import AHEAD, LINKS, LISTS
 from scenicq.geometry.map_traits import MapTraits
 from scenicq.geometry.network import Network
 from scenicq.geometry.occupancy import Layer, Occupancy
 from scenicq.geometry.regions import PolygonSet
-from scenicq.geometry.road_direction import DeferredDirection
+from scenicq.geometry.road_direction import DeferredDirection, RoadDirection
 
 __all__ = [
     "AbstractArea",
     "AbstractDirection",
     "AbstractElement",
+    "AbstractList",
     "AbstractNetwork",
     "AbstractOccupancy",
+    "LinkStep",
     "LinkedFrom",
     "NeedsMapError",
+    "led_kind",
 ]
 
 _RANKS = 2
@@ -112,10 +117,16 @@ class AbstractArea(PolygonSet):
         found: What the elements are at each place.
     """
 
-    def __init__(self, found: AbstractOccupancy) -> None:
-        """Take what they are."""
+    def __init__(self, found: AbstractOccupancy, orientation: RoadDirection | None = None) -> None:
+        """Take what they are.
+
+        Args:
+            found: That.
+            orientation: The direction there, where it is not that of each element.
+        """
         name = f"any {found.kind}"
-        vars(self).update(name=name, found=found, orientation=AbstractDirection(f"orientation of {name}"))
+        own = AbstractDirection(f"orientation of {name}") if orientation is None else orientation
+        vars(self).update(name=name, found=found, orientation=own)
 
     found: AbstractOccupancy
 
@@ -139,17 +150,67 @@ class AbstractArea(PolygonSet):
         raise TypeError(f"{self.name} is of no map")
 
 
+class AbstractList:
+    """A list that the element of a kind at one place has, of elements of one kind.
+
+    What a program does with it other than to look for an element there, or to draw one, needs a map.
+
+    Attributes:
+        found: The elements in it.
+        draw: Gives one of them, at random; there is no scene where there is none.
+        some: Gives what is equal to an element where it is in the list.
+    """
+
+    def __init__(
+        self, found: AbstractOccupancy, draw: Callable[[Span], object], some: Callable[[Span], object]
+    ) -> None:
+        """Take what is in it."""
+        self.found, self.draw, self.some = found, draw, some
+
+    def __bool__(self) -> bool:
+        """Whether it has elements depends on the map."""
+        raise NeedsMapError
+
+    def __len__(self) -> int:
+        """As many as the map says."""
+        raise NeedsMapError
+
+    def __iter__(self) -> Iterator[object]:
+        """The elements are the map's."""
+        raise NeedsMapError
+
+    def __eq__(self, other: object) -> bool:
+        """Lists are equal by their elements."""
+        raise NeedsMapError
+
+    def __hash__(self) -> int:
+        """None: lists have none."""
+        raise NeedsMapError
+
+
+class LinkStep(NamedTuple):
+    """A step from elements to others.
+
+    Attributes:
+        link: The link, or the list.
+        within: How many metres behind the end of the first a lane ahead begins at most.
+    """
+
+    link: str
+    within: float | None = None
+
+
 @dataclass(frozen=True, slots=True)
 class LinkedFrom:
     """What is found at a place, as what its elements lead to.
 
     Attributes:
         kind: The kind of the elements in whose areas the place is.
-        links: The links from one of these, one after the other, to what is found.
+        links: The steps from one of these, one after the other, to what is found.
     """
 
     kind: str
-    links: tuple[str, ...] = ()
+    links: tuple[LinkStep, ...] = ()
 
 
 class AbstractOccupancy(Occupancy):
@@ -159,30 +220,41 @@ class AbstractOccupancy(Occupancy):
         kind: The kind.
         starts: From what elements at the point it is found: a later one counts only where there are none of the
             earlier.
+        is_drawn: Whether it is one of several to which these lead, at random.
     """
 
-    def __init__(self, name: str, kind: str, starts: tuple[LinkedFrom, ...]) -> None:
+    def __init__(self, name: str, kind: str, starts: tuple[LinkedFrom, ...], *, is_drawn: bool = False) -> None:
         """Take the kind.
 
         Args:
             name: What messages call the look-up.
             kind: As of features; `lane_section` of what lanes consist of, whether or not the map cuts them.
             starts: From what elements.
+            is_drawn: Whether it is drawn from what they lead to.
         """
-        vars(self).update(name=name, kind=kind, starts=starts, nothing=1)
+        vars(self).update(name=name, kind=kind, starts=starts, nothing=1, is_drawn=is_drawn)
 
     kind: str
     starts: tuple[LinkedFrom, ...]
+    is_drawn: bool
 
     @property
     def is_found_itself(self) -> bool:
         """Whether the elements are found in areas that the map calls their own, and nowhere else."""
         return self.starts == (LinkedFrom(self.kind),) and self.kind != "lane_section"
 
-    def through(self, link: str) -> AbstractOccupancy:
-        """What the elements lead to by one of their links."""
-        starts = tuple(LinkedFrom(each.kind, (*each.links, link)) for each in self.starts)
-        return AbstractOccupancy(f"{self.name}.{link}", LINKS[self.kind][link], starts)
+    def through(self, link: str, *, within: float | None = None, is_drawn: bool = False) -> AbstractOccupancy:
+        """What the elements lead to by one of their links or lists.
+
+        Args:
+            link: The link.
+            within: How far lanes ahead begin at most.
+            is_drawn: Whether it is one of a list, at random.
+        """
+        step = LinkStep(link, within)
+        starts = tuple(LinkedFrom(each.kind, (*each.links, step)) for each in self.starts)
+        kind = led_kind(self.kind, link)
+        return AbstractOccupancy(f"{self.name}.{link}", kind, starts, is_drawn=is_drawn or self.is_drawn)
 
     def leads_to(self, other: AbstractOccupancy) -> bool:
         """Whether what this finds leads to what another one finds."""
@@ -213,6 +285,11 @@ class AbstractOccupancy(Occupancy):
     def __reduce__(self) -> NoReturn:
         """No copy over a map has it."""
         raise TypeError(f"{self.name} is of no map")
+
+
+def led_kind(kind: str, link: str) -> str:
+    """The kind of what a link or a list leads to from elements of a kind."""
+    return kind if link == AHEAD else {**LINKS.get(kind, {}), **LISTS.get(kind, {})}[link]
 
 
 def _read() -> NoReturn:

@@ -18,11 +18,11 @@ from __future__ import annotations
 
 import heapq
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import cast
+from typing import TypeAlias, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,10 +36,11 @@ from scenicq.geometry.elements import Lane
 from scenicq.geometry.network import Network
 from scenicq.geometry.regions import PolygonSet, PolylineSet, Region
 
-__all__ = ["BEYOND_M", "GAP_S", "NO_COURSE", "CourseLine", "CoursePlace", "Measures", "TrackStretch", "lane_course",
-           "measure", "track_courses"]  # fmt: skip
+__all__ = ["BEYOND_M", "GAP_S", "NO_COURSE", "CourseLine", "CoursePlace", "Measures", "StoredCourse", "TrackStretch",
+           "lane_course", "measure", "track_courses"]  # fmt: skip
 
 Numbers = NDArray[np.float64]
+_Ends: TypeAlias = tuple[float, float, float, float]
 
 GAP_S = 1.5
 """Seconds without a label at which a course is cut, if nothing else is said."""
@@ -80,7 +81,7 @@ class Measures:
     Attributes:
         along: How far ahead, behind negative.
         beside: How far to the left, right negative.
-        extended: Whether the course was not driven there, but goes on beyond its ends.
+        extended: Whether the course was not driven there, but goes on beyond its ends; not told of stored ends.
     """
 
     along: tuple[Numbers, Numbers]
@@ -242,7 +243,11 @@ class CoursePlace:
     stretch: TrackStretch | None = None
     sample: int = 0
 
-    def ends(self, x: float, y: float) -> tuple[float, float, float, float]:
+    def stored_ends(self, _x: float, _y: float) -> _Ends | None:
+        """The ends that are known of a place without the line."""
+        return None
+
+    def ends(self, x: float, y: float) -> _Ends:
         """The ends between which a place is along and beside the course; the same question is answered once."""
         if self.line is None:
             return -math.inf, math.inf, -math.inf, math.inf
@@ -251,6 +256,58 @@ class CoursePlace:
 
 
 NO_COURSE = CoursePlace(None)
+
+
+class StoredCourse(CoursePlace):
+    """A course of which it is known where some places are; the line is made when something else is asked."""
+
+    def __init__(self, known: Mapping[tuple[float, float], _Ends], make: Callable[[], CoursePlace]) -> None:
+        """Take the ends of the places that are known, and what makes the course."""
+        vars(self).update(_known=known, _make=make)
+
+    @cached_property
+    def _made(self) -> CoursePlace:
+        make: Callable[[], CoursePlace] = vars(self)["_make"]
+        return make()
+
+    def stored_ends(self, x: float, y: float) -> _Ends | None:
+        """The ends that are known of a place without the line."""
+        known: Mapping[tuple[float, float], _Ends] = vars(self)["_known"]
+        return known.get((x, y))
+
+    @property
+    def line(self) -> CourseLine | None:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """As of any course."""
+        return self._made.line
+
+    @property
+    def s(self) -> float:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """As of any course."""
+        return self._made.s
+
+    @property
+    def time_s(self) -> float:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """As of any course."""
+        return self._made.time_s
+
+    @property
+    def sign(self) -> float:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """As of any course."""
+        return self._made.sign
+
+    @property
+    def stretch(self) -> TrackStretch | None:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """As of any course."""
+        return self._made.stretch
+
+    @property
+    def sample(self) -> int:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """As of any course."""
+        return self._made.sample
+
+    def ends(self, x: float, y: float) -> _Ends:
+        """As of any course."""
+        return self.stored_ends(x, y) or self._made.ends(x, y)
 
 
 def measure(courses: Sequence[CoursePlace], xy: Numbers) -> Measures:
@@ -263,10 +320,13 @@ def measure(courses: Sequence[CoursePlace], xy: Numbers) -> Measures:
     unknown = (-math.inf, math.inf, -math.inf, math.inf, 0.0)
     found: list[tuple[float, ...]] = [unknown] * len(courses)
     by_line: dict[int, list[int]] = {}
-    for number, each in enumerate(courses):
-        if each.line is not None:
-            by_line.setdefault(id(each.line), []).append(number)
     places = xy.tolist()
+    for number, each in enumerate(courses):
+        stored = each.stored_ends(*places[number])
+        if stored is not None:
+            found[number] = (*stored, 0.0)
+        elif each.line is not None:
+            by_line.setdefault(id(each.line), []).append(number)
     for numbers in by_line.values():
         line = cast(CourseLine, courses[numbers[0]].line)
         for first in range(0, len(numbers), _AT_ONCE):

@@ -157,7 +157,7 @@ class ClassNames:
         """The class of the tree; for an unknown name it is `Object`, which is reported."""
         if (category := self.known.get(name)) is not None:
             return category
-        message = f"class `{name}` is in no taxonomy; its objects become `{ROOT}`"
+        message = f"class `{name}` has no class of the tree; its objects become `{ROOT}`"
         near = similar(name.capitalize(), subclasses(ROOT))
         suggestion = f'"{near}"' if near else "CLASS"
         hint = f'a class map with {{"{name}": {suggestion}}} gives it a class: `--class-map FILE`'

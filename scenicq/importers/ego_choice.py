@@ -15,7 +15,10 @@ from scenicq.importers.report import Report
 from scenicq.store.classes import is_subclass
 from scenicq.store.labels import Label, LabelObject
 
-__all__ = ["Moment", "ego_facts", "middle", "viewpoint", "with_egos"]
+__all__ = ["WITHOUT_EGO", "Moment", "ego_facts", "middle", "viewpoint", "with_egos"]
+
+WITHOUT_EGO = frozenset({"commonroad", "interaction", "openlabel"})
+"""The importers of formats whose files may have no ego."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,6 +15,7 @@ from pathlib import Path
 from scenicq import __version__
 from scenicq.errors import DataError, Diagnostic
 from scenicq.importers.base import Importer, ImportOptions, OpenedSource, RecordingEntry, read_class_map
+from scenicq.importers.ego_choice import WITHOUT_EGO
 from scenicq.importers.fields import LONGEST_TEXT
 from scenicq.importers.folders import readable
 from scenicq.importers.opendrive import convert_maps
@@ -116,6 +117,10 @@ def ingest(
     """
     source_path, target_path = Path(source), Path(target)
     importer = choose_importer(source_path, format)
+    if ego is not None and importer.name not in WITHOUT_EGO:
+        message = f"`--ego` is for sources without an ego; {importer.name} says of each frame which it is"
+        hint = "leave it out; `--ego any` at matching lets every object of a class be the scenario's ego"
+        raise DataError(Diagnostic("option-invalid", message, hints=(hint,)))
     given = _map_files(maps)
     classes = {} if class_map is None else read_class_map(Path(class_map))
     report = Report(strict=strict)

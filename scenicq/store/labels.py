@@ -71,6 +71,8 @@ class LabelObject:
         out_of_plane: Height and tilt; None where nothing of them is known, or was read.
         last_lane: The number of the last lane of its track among the map's elements, where that tells more of its lanes
             than its heading does (`scenicq.store.last_lanes`); computed as the motion is.
+        on_ego_course: Between which ends it is along and beside the ego's course (`scenicq.store.ego_courses`): low,
+            high, right, left; None for what was not read from a store, or what nobody asks for.
     """
 
     id: str
@@ -88,6 +90,7 @@ class LabelObject:
     motion: Motion | None = field(default=None, compare=False)
     out_of_plane: OutOfPlane | None = None
     last_lane: float | None = field(default=None, compare=False)
+    on_ego_course: tuple[float, float, float, float] | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True, slots=True)

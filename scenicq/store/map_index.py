@@ -12,7 +12,7 @@ import shapely
 from numpy.typing import NDArray
 
 from scenicq.geometry.angles import normalize_array
-from scenicq.geometry.centerlines import centerlines, lane_direction
+from scenicq.geometry.centerlines import centerlines, has_centerline, lane_direction
 from scenicq.geometry.features import MapFeature, names
 from scenicq.geometry.network import Network
 from scenicq.geometry.own_directions import along_centerline
@@ -23,6 +23,9 @@ from scenicq.store.last_lanes import LanePairs, last_lanes
 from scenicq.store.schema import MEMBERSHIP_RADIUS_M
 
 __all__ = ["MapIndex"]
+
+NO_WAY = 1e9
+"""How far what has no direction leads from any heading."""
 
 
 class MapIndex:
@@ -122,20 +125,48 @@ class MapIndex:
         found = np.full(len(near.point), np.nan)
         lane = self._lane_of[near.feature] if len(self._features) else np.empty(0, dtype=np.int64)
         inside = np.flatnonzero((near.distance == 0) & (lane >= 0))
-        if not len(inside):
-            return found
-        member, lane = near.point[inside], lane[inside]
+        found[inside] = self._turned(xy, place, headings, near.point[inside], lane[inside])
+        return found
+
+    def section_turns(
+        self,
+        xy: NDArray[np.float64],
+        place: NDArray[np.intp],
+        headings: NDArray[np.float64],
+        near: Memberships,
+    ) -> NDArray[np.float64]:
+        """The same of each section that has a line of its own, by that line; nan of all else.
+
+        It is `NO_WAY` where the line has no direction. Arguments as of `turns`.
+        """
+        found = np.full(len(near.point), np.nan)
+        own = self._has_line[near.feature] if len(self._features) else np.empty(0, dtype=bool)
+        inside = np.flatnonzero((near.distance == 0) & own)
+        turned = self._turned(xy, place, headings, near.point[inside], near.feature[inside])
+        found[inside] = np.where(np.isnan(turned), NO_WAY, turned)
+        return found
+
+    def _turned(
+        self,
+        xy: NDArray[np.float64],
+        place: NDArray[np.intp],
+        headings: NDArray[np.float64],
+        member: NDArray[np.int64],
+        lane: NDArray[np.int64],
+    ) -> NDArray[np.float64]:
+        """How far elements lead from the headings of who is in them, by their lines; nan where they do not lead."""
+        if not len(member):
+            return np.empty(0)
         _, first, at = np.unique(place[member] * len(self._features) + lane, return_index=True, return_inverse=True)
         ways = self._directions(xy[member[first]], lane[first])
         # of several directions at a place the nearest counts
-        turns = np.full(len(inside), np.inf)
+        turns = np.full(len(member), np.inf)
         for rank in range(max(map(len, ways))):
             way = np.array([each[rank] if rank < len(each) else np.nan for each in ways])[at]
             turns = np.fmin(turns, np.abs(normalize_array(way - headings[member])))
         turns[np.isinf(turns)] = np.nan
         turns[np.isnan(headings[member])] = 0.0
-        found[inside] = turns
-        return found
+        return turns
 
     @cached_property
     def network(self) -> Network:
@@ -152,6 +183,12 @@ class MapIndex:
                 own = (lanes[name] for name in names(feature, "lane") if name in lanes)
                 found[number] = next(own, -1)
         return found
+
+    @cached_property
+    def _has_line(self) -> NDArray[np.bool_]:
+        """Whether each element is a section of a lane with a line of its own."""
+        own = (feature.kind == "lane_section" and has_centerline(feature) for feature in self._features)
+        return np.fromiter(own, dtype=bool, count=len(self._features))
 
     @cached_property
     def _continued(self) -> dict[int, frozenset[int]]:

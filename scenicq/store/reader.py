@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from scenicq.store.recorded_tracks import RecordedTracks
 
 __all__ = [
+    "COURSE_COLUMNS",
     "EGO_COLUMNS",
     "LABEL_COLUMNS",
     "LAST",
@@ -46,6 +47,8 @@ OBJECT_COLUMNS = ["id", "class", "source_class", "x", "y", "heading", "width", "
 OBJECT_COLUMNS.extend(("track", "attributes", LAST))
 MOTION_COLUMNS = ["motion_vx", "motion_vy", "acceleration", "yaw_rate", "motion_derived"]
 """What is computed of motion; a query that does not ask for it need not read it."""
+COURSE_COLUMNS = [f"ego_{axis}{end}" for axis in ("along", "beside") for end in ("", "_less", "_more")]
+"""Where label objects are on the ego's course, which the ego itself has no columns for."""
 EGO_COLUMNS = [f"ego_{name}" for name in OBJECT_COLUMNS[1:]]
 LABEL_COLUMNS = ["frame", "recording", "timestamp_us", "map", "params", "object_count", "sensor_count"]
 LABEL_COLUMNS.extend(("first_object", "first_sensor"))
@@ -117,7 +120,7 @@ def assemble(
     Args:
         frames: `LABEL_COLUMNS` and `EGO_COLUMNS` of each label; its counts say how many rows of the others are its own.
         objects: `OBJECT_COLUMNS`, label by label; both may have `MOTION_COLUMNS` and `OUT_OF_PLANE`, too, and may lack
-            columns of what nobody looks at.
+            columns of what nobody looks at. It may have `COURSE_COLUMNS`.
         sensors: Channels and paths, label by label; it may have `CAMERA_COLUMNS`.
         recorded: As `read_labels` has it.
     """
@@ -160,11 +163,24 @@ def _spaces(table: ArrowTable, prefix: str) -> Iterable[OutOfPlane | None]:
     return (None if row == (None, None, None) else OutOfPlane(*row) for row in rows)
 
 
+def _on_ego_course(table: ArrowTable, prefix: str) -> Iterable[tuple[float, float, float, float] | None]:
+    """The ends between which each row is along and beside the ego's course, where the table has them."""
+    if prefix or COURSE_COLUMNS[0] not in table.column_names:
+        return repeat(None)
+    ends: list[NDArray[np.float64]] = []
+    for first in (0, 3):
+        # nan where there is no end
+        value, less, more = (table[name].to_numpy() for name in COURSE_COLUMNS[first : first + 3])
+        ends += [np.nan_to_num(value - less, nan=-np.inf), np.nan_to_num(value + more, nan=np.inf)]
+    return zip(*(each.tolist() for each in ends), strict=True)
+
+
 def _objects(columns: list[list[Any]], table: ArrowTable, prefix: str) -> list[LabelObject]:
     motions, spaces = _motions(table, prefix), _spaces(table, prefix)
     *before, vx, vy, track, attributes, last_lanes = columns
     velocities = [None if x is None else (x, y) for x, y in zip(vx, vy, strict=True)]
-    return [*map(LabelObject, *before, velocities, track, attributes, motions, spaces, last_lanes)]
+    courses = _on_ego_course(table, prefix)
+    return [*map(LabelObject, *before, velocities, track, attributes, motions, spaces, last_lanes, courses)]
 
 
 def _values(table: ArrowTable, name: str) -> list[Any]:

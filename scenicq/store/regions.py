@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from scenicq.geometry.centerlines import centerlines
 from scenicq.geometry.features import MapFeature, names
-from scenicq.geometry.links import links_of
+from scenicq.geometry.links import Link, links_of
 from scenicq.geometry.map_traits import MapTraits, traits_of
 from scenicq.store.manifest import MapGroup
 from scenicq.store.place import StoreFile, open_parquet
@@ -62,8 +62,8 @@ def lane_rows(map_name: str, features: Sequence[MapFeature]) -> ArrowTable:
 def link_rows(map_name: str, features: Sequence[MapFeature]) -> ArrowTable:
     """How the elements of a map hang together."""
     found = list(links_of(features))
-    columns = list(zip(*found, strict=True)) or [[], [], [], []]
-    rows = dict(zip(("kind", "region", "link", "target"), columns, strict=True))
+    columns = list(zip(*found, strict=True)) or [[] for _ in Link._fields]
+    rows = dict(zip(Link._fields, columns, strict=True))
     return pa.table({"map": [map_name] * len(found), **rows}, schema=SCHEMAS["links"])
 
 

@@ -53,13 +53,14 @@ def recording_rows(
     # no motion crosses a label without an ego
     passages = accumulate(int(not category) for category in egos.category)
     one_track = [f"ego {n}" if category else None for n, category in zip(passages, egos.category, strict=True)]
-    last_lane, turns = np.full(len(xy), -1), np.empty(0)
+    last_lane, turns, section_turns = np.full(len(xy), -1), np.empty(0), np.empty(0)
     if index is not None:
         by_place = np.argsort(np.concatenate((ego_at, object_at)))
         when, headings = np.concatenate((times, times[label_of])), np.concatenate((egos.heading, objects.heading))
         headings, tracks = headings[by_place], ego_and_object_tracks(one_track, objects.track)
         last_lane = index.last_lanes(when[by_place], tracks[by_place], xy, headings, placed.near)
         turns = index.turns(xy, placed.place, headings, placed.near)
+        section_turns = index.section_turns(xy, placed.place, headings, placed.near)
     return {
         "labels": _table(
             "labels",
@@ -98,7 +99,10 @@ def recording_rows(
                 "last_lane": _known(last_lane[object_at]),
             },
         ),
-        "memberships": _table("memberships", _memberships(columns, index, placed, ego_at, object_at, turns)),
+        "memberships": _table(
+            "memberships",
+            _memberships(columns, index, placed, ego_at, object_at) | {"turn": turns, "section_turn": section_turns},
+        ),
         "sensors": _table(
             "sensors",
             {
@@ -151,7 +155,6 @@ def _memberships(
     placed: _Placed,
     ego_at: NDArray[np.int64],
     object_at: NDArray[np.int64],
-    turns: NDArray[np.float64],
 ) -> dict[str, Any]:
     near = placed.near
     many = np.bincount(near.point, minlength=len(placed.lane))
@@ -167,7 +170,6 @@ def _memberships(
         "kind": pa.nulls(0, pa.string()) if index is None else index.kinds.at(near.feature),
         "region": _names(index, near.feature),
         "distance": near.distance,
-        "turn": turns,
     }
 
 

@@ -33,10 +33,10 @@ ArrowTable: TypeAlias = pa.Table
 ArrowArray: TypeAlias = pa.Array
 """A column of rows."""
 
-SCHEMA_VERSION = 8
+SCHEMA_VERSION = 9
 """Changes with every change of a table that a reader could notice."""
 
-UPGRADABLE = frozenset({2, 3, 4, 5, 6, 7})
+UPGRADABLE = frozenset({2, 3, 4, 5, 6, 7, 8})
 """Older versions of which `scenicq index` makes this one: it computes anew what is computed."""
 
 ADDED = {4: frozenset({"z", "pitch", "roll", "image_width", "image_height", "intrinsics", "camera_pose"})}
@@ -149,6 +149,8 @@ SCHEMAS: dict[str, pa.Schema] = {
             _required("distance", _REAL),  # 0 inside and on the boundary
             # in a lane or a section of one how far it leads from the heading of who is there; 0 for who has none
             pa.field("turn", _REAL),
+            # the same of a section with a line of its own, by that line; more than pi where it has no direction
+            pa.field("section_turn", _REAL),
         ]
     ),
     # One row a map element, in the order of the map.
@@ -181,6 +183,8 @@ SCHEMAS: dict[str, pa.Schema] = {
             _required("region", _TEXT),
             _required("link", _TEXT),  # the attribute that leads to the other
             _required("target", _TEXT),
+            # of a lane ahead, how many metres behind the end of the first it begins; null of all other links
+            pa.field("begins", _REAL),
         ]
     ),
     # One row a sensor file. Cameras: all four are known, or none.

@@ -39,7 +39,7 @@ _TURNS = frozenset(
     "heading ego_heading relative_heading road_directions ego_road_directions pitch roll ego_pitch ego_roll".split()
 )
 _NOT_NEGATIVE = frozenset(
-    "distance turn ego_distance width length height ego_width ego_length ego_height"
+    "distance turn section_turn begins ego_distance width length height ego_width ego_length ego_height"
     " ego_along_less ego_along_more ego_beside_less ego_beside_more".split(),
 )
 TEXT_KEYS = frozenset({"frame", "recording", "map"})

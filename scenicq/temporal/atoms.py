@@ -377,16 +377,22 @@ class AtomColumns:
         if not isinstance(samples, BoundSamples) or not len(samples):
             return Column(np.full(1, np.nan), np.full(1, UNOBSERVED))
         if not self._elements:
-            self._elements += samples.pieces()
+            self._elements += samples.pieces(self._rules)
         found: list[Column] = []
         for first, end, elements in self._elements:
             look()
             # those of many samples are not kept
-            there = elements or samples.at(np.arange(first, end)).elements()
+            there = elements or samples.at(np.arange(first, end)).elements(self._rules)
             rows = np.arange(first, end)
             mine = [each if _is_one(each) else take_rows(each, rows, len(samples)) for each in inputs]
             found.append(among_column(node, mine, there))
         return found[0] if len(found) == 1 else concatenate(found)
+
+    @property
+    def _rules(self) -> LaneCourse | None:
+        """How the courses of label objects without a role are made, if the scenario asks for any."""
+        given = (each.properties.get(COURSE) for each in self.scenario.objects)
+        return next((each.value for each in given if each and isinstance(each.value, LaneCourse)), None)
 
     def _observed_at(self, node: Feature, samples: NDArray[np.int64]) -> Column:
         """What is observed of a feature at some samples."""

@@ -8,9 +8,11 @@ matches the scenario of one of them.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
+from scenicq.forest.bounds import Box, vector_bounds
 from scenicq.forest.condition import condition, expand
 from scenicq.forest.groups import PARAMS
 from scenicq.forest.nodes import Constant, DirectionAt, Feature, Identity, Index, Leaf, Node, Select
@@ -30,19 +32,37 @@ from scenicq.temporal.samples import is_moving
 __all__ = ["Outcome", "outcomes_of", "place_of", "steady_value"]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(eq=False)
 class Outcome:
     """One joint outcome of choices.
 
     Attributes:
-        scenario: The scenario with the choices made.
-        witness: What was chosen, by the places in the program.
+        whole: The scenario in which the choices are open.
+        given: What was chosen.
+        witness: That, by the places in the program.
         same_start: Whether the initial scene depends on none of the choices.
     """
 
-    scenario: Scenario
-    witness: Mapping[str, WitnessValue]
+    whole: Scenario
+    given: Mapping[Identity, float] = field(default_factory=dict[Identity, float])
+    witness: Mapping[str, WitnessValue] = field(default_factory=dict[str, WitnessValue])
     same_start: bool = True
+
+    @cached_property
+    def scenario(self) -> Scenario:
+        """The scenario with the choices made: of many outcomes, few have a start in a recording."""
+        memo = dict[int, Node]()
+        made = rebuilt(self.whole, lambda node: condition(node, {}, self.given, memo)) if self.given else self.whole
+        return _from_the_start(made)
+
+    @cached_property
+    def start_boxes(self) -> Mapping[int, Box]:
+        """Where objects may be at the start, by object; what hangs on others, or has noise, may be anywhere."""
+        return {
+            owner.index: vector_bounds(condition(owner.properties["position"].value, {}, self.given))
+            for owner in self.whole.objects
+            if "position" in owner.properties and "position" not in owner.mutated
+        }
 
 
 def outcomes_of(scenario: Scenario) -> tuple[Outcome, ...]:
@@ -51,18 +71,32 @@ def outcomes_of(scenario: Scenario) -> tuple[Outcome, ...]:
     Args:
         scenario: The scenario as compiled.
     """
+    whole = Outcome(scenario)
+    dynamics = scenario.dynamics
+    conditions = () if dynamics is None else dynamics.conditions
+    initial = {leaf.identity for leaf in leaves(*roots_of(replace(scenario, dynamics=None)))}
+    # a choice among elements has hundreds of options: what is asked of each is about the conditions alone
+    roots = [expand(each, lambda feature: steady_value(scenario, feature)) for each in conditions]
     found: list[Outcome] = []
-    whole = Outcome(scenario, {})
-    stack = [whole]
+    stack = [(whole, roots)]
     while stack:
-        outcome = stack.pop()
-        choice = _choice(outcome.scenario)
+        outcome, roots = stack.pop()
+        choice = _choice(roots)
         if choice is None:
-            found.append(replace(outcome, scenario=_from_the_start(outcome.scenario)))
+            found.append(outcome)
             continue
-        stack += reversed(list(_made(outcome, *choice)))
+        leaf, options = choice
+        same_start = outcome.same_start and leaf.identity not in initial
+        further: list[tuple[Outcome, list[Node]]] = []
+        for option in options:
+            given, memo = {leaf.identity: float(option)}, dict[int, Node]()
+            made = Outcome(
+                scenario, {**outcome.given, **given}, {**outcome.witness, place_of(leaf): float(option)}, same_start
+            )
+            further.append((made, [condition(root, {}, given, memo) for root in roots]))
+        stack += reversed(further)
         if len(found) + len(stack) > LIMITS.outcomes_over_time:
-            return (replace(whole, scenario=_from_the_start(scenario)),)
+            return (whole,)
     return tuple(found) or (whole,)
 
 
@@ -78,11 +112,8 @@ def steady_value(scenario: Scenario, feature: Feature) -> Node | None:
     return scenario.every_object[feature.object].properties[feature.property].value
 
 
-def _choice(scenario: Scenario) -> tuple[Leaf, range] | None:
-    """A choice that conditions over time depend on, with its options."""
-    dynamics = scenario.dynamics
-    conditions = () if dynamics is None else dynamics.conditions
-    roots = [expand(each, lambda feature: steady_value(scenario, feature)) for each in conditions]
+def _choice(roots: Sequence[Node]) -> tuple[Leaf, range] | None:
+    """A choice that conditions over time depend on, written out, with its options."""
     # which of several elements lie at a hidden place is for the matcher to tell
     of_places = {
         node.index.identity
@@ -157,18 +188,3 @@ def _shared(scenario: Scenario) -> list[Requirement]:
 def _at_sample(node: Node) -> Node:
     """A feature as it is at a sample, which is the first one here."""
     return replace(node, current=True) if isinstance(node, Feature) else node
-
-
-def _made(outcome: Outcome, leaf: Leaf, options: range) -> Iterator[Outcome]:
-    """The outcomes that options of a choice make of one in which it is open."""
-    initial = roots_of(replace(outcome.scenario, dynamics=None))
-    same_start = outcome.same_start and all(each.identity is not leaf.identity for each in leaves(*initial))
-    for option in options:
-        given, memo = {leaf.identity: float(option)}, dict[int, Node]()
-        yield Outcome(
-            _with(outcome.scenario, given, memo), {**outcome.witness, place_of(leaf): float(option)}, same_start
-        )
-
-
-def _with(scenario: Scenario, given: Mapping[Identity, float], memo: dict[int, Node]) -> Scenario:
-    return rebuilt(scenario, lambda node: condition(node, {}, given, memo))

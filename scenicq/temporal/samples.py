@@ -134,11 +134,15 @@ class BoundSamples:
         labels = None if self.labels is None else self.labels[chosen]
         return BoundSamples(self.block, members, size, labels, self.classes)
 
-    def elements(self) -> LabelElements:
-        """All label objects of the label of each place, whether or not they play a role."""
-        return label_elements(self.block, self._labels(), self.classes)
+    def elements(self, rules: LaneCourse | None) -> LabelElements:
+        """All label objects of the label of each place, whether or not they play a role.
 
-    def pieces(self) -> list[tuple[int, int, LabelElements | None]]:
+        Args:
+            rules: How their courses are made, if anybody asks for any.
+        """
+        return label_elements(self.block, self._labels(), self.classes, rules)
+
+    def pieces(self, rules: LaneCourse | None) -> list[tuple[int, int, LabelElements | None]]:
         """From where to where places have not too many label objects, and these, where all are one piece."""
         counts = np.cumsum(np.append(np.diff(self.block.object_starts), 0)[self._labels()] + 1)
         cuts = [0]
@@ -146,7 +150,7 @@ class BoundSamples:
             before = int(counts[cuts[-1] - 1]) if cuts[-1] else 0
             cuts.append(max(cuts[-1] + 1, int(np.searchsorted(counts, before + _AT_ONCE, side="right"))))
         if len(cuts) == 2:
-            return [(0, self.size, self.elements())]
+            return [(0, self.size, self.elements(rules))]
         return [(first, end, None) for first, end in pairwise(cuts)]
 
     def _labels(self) -> NDArray[np.int64]:
@@ -155,13 +159,16 @@ class BoundSamples:
         return np.max([np.where(mine >= 0, self.block.label_of[mine], -1) for mine in self.members.values()], 0)
 
 
-def label_elements(block: TrackBlock, labels: NDArray[np.int64], classes: Granularity) -> LabelElements:
+def label_elements(
+    block: TrackBlock, labels: NDArray[np.int64], classes: Granularity, rules: LaneCourse | None
+) -> LabelElements:
     """The label objects of some labels, place by place, the egos that are there among them.
 
     Args:
         block: Has all of them.
         labels: The label of each place, -1 where it is not known.
         classes: How classes are compared.
+        rules: How courses are made, if anybody asks for any.
     """
     counts = np.where(labels >= 0, np.diff(block.object_starts)[labels], 0)
     place = np.repeat(np.arange(len(labels)), counts)
@@ -183,7 +190,7 @@ def label_elements(block: TrackBlock, labels: NDArray[np.int64], classes: Granul
 
     @cache
     def observed(name: str) -> Column:
-        found = rows.observed(0, name)
+        found = rows.courses(0, rules) if name == COURSE and rules is not None else rows.observed(0, name)
         if found is None:
             return Column(np.full(1, np.nan), np.full(1, UNKNOWN))
         if isinstance(found, list):

@@ -38,7 +38,7 @@ from scenicq.temporal.presence import group_by_observed, observed_properties
 from scenicq.temporal.samples import WITH_COLUMNS, BoundSamples
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 
-__all__ = ["RoleCandidates", "StartSearch", "Starts", "narrow_candidates", "start_matchers"]
+__all__ = ["RoleCandidates", "StartMatchers", "StartSearch", "Starts", "narrow_candidates"]
 
 Members = NDArray[np.int64]
 _AT_ONCE = 200_000
@@ -103,22 +103,39 @@ class _Derived(PlanCache):
         return self.plans[signature]
 
 
-def start_matchers(matcher: Matcher, outcomes: Sequence[Outcome]) -> list[Matcher]:
-    """What decides single labels where they are starts, one matcher for each outcome of the choices over time.
+@dataclass(eq=False)
+class StartMatchers:
+    """What decides single labels where they are starts, with each outcome of the choices over time.
 
     Interchangeable objects take one order in all labels.
+
+    Attributes:
+        matcher: Decides labels of the scenario in which the choices are open.
+        outcomes: The outcomes.
+        whole: Decides starts of that scenario.
     """
-    plans = PlanCache(matcher.scenario, matcher.options, one_order=True)
-    whole = Matcher(matcher.scenario, matcher.options, matcher.solver, plans)
 
-    def with_outcome(outcome: Outcome) -> Matcher:
-        if outcome.same_start:
-            return whole
-        scenario = prepare_scenario(outcome.scenario)
-        derived = _Derived(scenario, matcher.options, whole=plans)
-        return Matcher(scenario, matcher.options, matcher.solver, derived)
+    matcher: Matcher
+    outcomes: Sequence[Outcome]
+    whole: Matcher = field(init=False)
+    _made: dict[int, Matcher] = field(init=False, default_factory=dict[int, Matcher])
 
-    return [with_outcome(outcome) for outcome in outcomes]
+    def __post_init__(self) -> None:
+        """Make ready what all outcomes share."""
+        matcher = self.matcher
+        plans = PlanCache(matcher.scenario, matcher.options, one_order=True)
+        self.whole = Matcher(matcher.scenario, matcher.options, matcher.solver, plans)
+
+    def __getitem__(self, outcome: int) -> Matcher:
+        """What decides starts with an outcome, by its number."""
+        told = self.outcomes[outcome]
+        if told.same_start:
+            return self.whole
+        if outcome not in self._made:
+            scenario = prepare_scenario(told.scenario)
+            derived = _Derived(scenario, self.matcher.options, whole=self.whole.plans)
+            self._made[outcome] = Matcher(scenario, self.matcher.options, self.matcher.solver, derived)
+        return self._made[outcome]
 
 
 @dataclass(eq=False)

@@ -13,11 +13,13 @@ import pytest
 from label_rows import labels_of
 from shapely import box, unary_union
 
+from scenicq.errors import DataError
 from scenicq.geometry import angles
 from scenicq.importers.argoverse2 import Argoverse2
 from scenicq.importers.argoverse2_forecasting import Argoverse2Forecasting
 from scenicq.importers.base import Importer, ImportOptions
 from scenicq.importers.commonroad import CommonRoad
+from scenicq.importers.ego_choice import WITHOUT_EGO
 from scenicq.importers.ingest import ingest
 from scenicq.importers.interaction import Interaction
 from scenicq.importers.interchange import Interchange
@@ -321,6 +323,21 @@ def test_store_round_trip(case: Case, tmp_path: Path) -> None:
     assert list(dataset.labels()) == read_labels(case)
     for name, features in case.importer.read(case.path, ImportOptions(case.maps), Report()).maps.items():
         assert dataset.features(name) == features
+
+
+def test_an_ego_is_chosen_or_the_choice_is_refused(case: Case, tmp_path: Path) -> None:
+    """An option that cannot change anything is told."""
+    if case.path.parent == REAL:
+        pytest.skip("samples are enough")
+    name = case.importer.name
+    if name not in WITHOUT_EGO:
+        with pytest.raises(DataError, match="option-invalid"):
+            ingest(case.path, tmp_path / "d", format=name, ego="none")
+        assert not (tmp_path / "d").exists()
+        return
+    ingest(case.path, tmp_path / "d", format=name, ego="none")
+    # a file of OpenLABEL may have one, and that of the sample does
+    assert all(label.has_ego is (name == "openlabel") for label in open_dataset(tmp_path / "d").labels())
 
 
 def test_golden_rows(case: Case) -> None:

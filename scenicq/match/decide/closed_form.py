@@ -33,13 +33,15 @@ class GroupEvaluation(NamedTuple):
 
     Attributes:
         holds: Whether it is surely satisfied; of many assignments, one truth value each.
-        fails: Whether it surely cannot be. Where neither is true nothing is said.
+        fails: Whether it surely cannot be.
         values: A witness for where it holds; elsewhere it means nothing.
+        open: Whether what is not observed would tell. Where none of the three is true nothing is said.
     """
 
     holds: bool | Sequence[bool]
     fails: bool | Sequence[bool]
     values: Mapping[Identity, Value | FloatColumn | list[Value]]
+    open: bool | Sequence[bool] = False
 
 
 FAILS = GroupEvaluation(False, True, {})
@@ -60,6 +62,7 @@ class ClosedForm:
         index: The object whose position matters to field or regions.
         detail: What a refutation says.
         parts: The closed forms of which it is made, if it is of several constraints.
+        takes_columns: Whether it takes nothing but columns, also of one assignment.
     """
 
     constraint: Comparison | Condition
@@ -69,6 +72,7 @@ class ClosedForm:
     index: int = -1
     detail: Callable[[Lookup, MapLookups], str] | None = None
     parts: tuple[ClosedForm, ...] = ()
+    takes_columns: bool = False
 
     def decide(self, get: Lookup, options: MatchOptions, lookups: MapLookups) -> Outcome | None:
         """Decide one assignment.

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from scenicq.forest.among import LabelElements
-from scenicq.forest.nodes import COURSE, Value
+from scenicq.forest.nodes import COURSE, LaneCourse, Value
 from scenicq.forest.scenario import Scenario
 from scenicq.limits import LIMITS, limit_exceeded
 from scenicq.match.options import MatchOptions
@@ -81,6 +81,7 @@ class LabelProblem:
         ranks: Place of each candidate in that order.
         disc: Centre and radius of the area that is looked at, metres; None for everywhere.
         classes: How finely classes are compared.
+        courses: How courses are made, if the scenario asks for any.
         elements: The label objects for conditions that go through all of them, made when one first asks.
     """
 
@@ -92,6 +93,7 @@ class LabelProblem:
     ranks: Mapping[int, int]
     disc: tuple[tuple[float, float], float] | None
     classes: Granularity = "fine"
+    courses: LaneCourse | None = None
     elements: LabelElements | None = None
 
     def signatures(
@@ -182,12 +184,14 @@ def prepare_label(
     ranks = rank_by_distance(label, ego, candidates.values())
     candidates = {index: tuple(sorted(numbers, key=ranks.__getitem__)) for index, numbers in candidates.items()}
     seen = [*map(observe, label_objects)]
-    for index, rules in course_rules(scenario).items():
+    every_rule = course_rules(scenario)
+    for index, rules in every_rule.items():
         for number in candidates.get(index, (ego,)):
             course = observe_course(label, label_objects[number], rules)
             if course is not None:
                 seen[number] = {**seen[number], COURSE: course}
-    return LabelProblem(label, ego, tuple(seen), observe_params(label), candidates, ranks, disc, options.classes)
+    rules = next(iter(every_rule.values()), None)
+    return LabelProblem(label, ego, tuple(seen), observe_params(label), candidates, ranks, disc, options.classes, rules)
 
 
 def candidates_of(

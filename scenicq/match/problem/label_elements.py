@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from scenicq.forest.among import LABEL_OBJECTS, LabelElements
 from scenicq.forest.columns import DEFINED, UNKNOWN, Column, column_of
-from scenicq.forest.nodes import IDENTITY, OPEN, RANK, TRACK, Value
+from scenicq.forest.nodes import COURSE, IDENTITY, OPEN, RANK, TRACK, Value
 from scenicq.match.problem.candidates import LabelProblem
+from scenicq.match.problem.observation import course_without_role
 from scenicq.store.classes import Granularity, class_truth
 from scenicq.store.labels import Label, LabelObject
 
@@ -40,17 +41,28 @@ def observe_roles(problem: LabelProblem, assignment: Mapping[int, int]) -> dict[
 
 
 def _elements(problem: LabelProblem) -> LabelElements:
-    return elements_of([problem.label], lambda _, number: problem.seen[number], problem.classes)
+    label = problem.label
+    objects = (label.ego, *label.objects)
+
+    def course(_: int, number: int) -> Value:
+        known = problem.seen[number].get(COURSE)
+        return known or course_without_role(label, objects[number], problem.courses)
+
+    return elements_of([label], lambda _, number: problem.seen[number], course, problem.classes)
 
 
 def elements_of(
-    labels: Sequence[Label], seen: Callable[[int, int], Mapping[str, Value]], classes: Granularity
+    labels: Sequence[Label],
+    seen: Callable[[int, int], Mapping[str, Value]],
+    course: Callable[[int, int], Value],
+    classes: Granularity,
 ) -> LabelElements:
     """The label objects of labels, a place each.
 
     Args:
         labels: The labels.
         seen: What is observed of a label object, by the place of its label and its number there.
+        course: The course of one likewise, asked for only where a condition asks for it.
         classes: How classes are compared.
     """
     firsts = [0 if label.has_ego else 1 for label in labels]
@@ -76,6 +88,8 @@ def elements_of(
             return Column((x, y), np.full(len(objects), DEFINED))
         if name == OPEN:
             return Column(np.zeros(len(objects)), np.full(len(objects), UNKNOWN))
+        if name == COURSE:
+            return column_of([course(*each) for each in zip(place.tolist(), numbers, strict=True)])
         return column_of([seen(*each).get(name) for each in zip(place.tolist(), numbers, strict=True)])
 
     known = np.ones(len(labels), np.bool_)

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from functools import lru_cache
+from functools import lru_cache, partial
 
 from scenicq.forest.nodes import COURSE, GOING, LAST_LANE, LaneCourse, Value
 from scenicq.forest.scenario import Scenario
-from scenicq.geometry.driven_courses import CoursePlace
+from scenicq.geometry.driven_courses import GAP_S, CoursePlace, StoredCourse, lane_course
 from scenicq.store.labels import Label, LabelObject
 from scenicq.store.recorded_tracks import EGO
 
-__all__ = ["IN_COLUMNS", "course_rules", "observe", "observe_course", "observe_params", "observed_names"]
+__all__ = [
+    "IN_COLUMNS", "course_rules", "course_without_role", "observe", "observe_course", "observe_params",
+    "observed_names",
+]  # fmt: skip
 
 IN_COLUMNS = frozenset({
     "position", "heading", "width", "length", "height", "velocity", "speed", "acceleration", "angularSpeed", COURSE,
@@ -64,7 +67,22 @@ def observe_course(label: Label, label_object: LabelObject, rules: LaneCourse) -
         return None
     track = EGO if label_object is label.ego else None if label_object.track is None else ("track", label_object.track)
     place = (label_object.x, label_object.y, label_object.heading)
-    return label.recorded.course(rules.network, rules.gap_s, label.recording, label.frame, track, place)
+    make = partial(label.recorded.course, rules.network, rules.gap_s, label.recording, label.frame, track, place)
+    if label_object is not label.ego or rules.gap_s != GAP_S:
+        return make()
+    known = {(each.x, each.y): each.on_ego_course for each in label.objects if each.on_ego_course is not None}
+    return StoredCourse(known, make) if known else make()
+
+
+def course_without_role(label: Label, label_object: LabelObject, rules: LaneCourse | None) -> CoursePlace | None:
+    """The course of a label object that need not play a role; None where the scenario asks for none.
+
+    Where nothing but the label itself is known, it is that of the lane, as of what is seen once.
+    """
+    if rules is None:
+        return None
+    found = observe_course(label, label_object, rules)
+    return found or lane_course(rules.network, label_object.x, label_object.y, label_object.heading)
 
 
 def observed_names(label_object: LabelObject) -> frozenset[str]:

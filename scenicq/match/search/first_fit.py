@@ -4,14 +4,16 @@ Most of what a prefilter leaves matches in the first way that is tried. Where al
 the labels that share it are a batch: role by role, in the order of the program, each label gives its next free
 candidate, and the closed forms are computed once for the whole batch. Labels whose candidate fails form a batch of
 their own with their next one, or with the next of an earlier role. A label all of whose candidates surely fail does
-not match. Whoever is not surely decided is left to `LabelSearch`. One label is a batch of one.
+not match. What is open (it depends on what is not observed) is passed over first; a label that nothing else fills is
+unknown by the first correspondence that nothing excludes. Whoever is not surely decided is left to `LabelSearch`. One
+label is a batch of one.
 """
 
 from __future__ import annotations
 
 import functools
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TypeAlias, TypeVar, cast
 
@@ -22,7 +24,7 @@ from scenicq.budget import look
 from scenicq.errors import CannotEvaluate
 from scenicq.forest.among import LABEL_OBJECTS
 from scenicq.forest.columns import CodedValues
-from scenicq.forest.groups import Constraint
+from scenicq.forest.groups import Constraint, Group
 from scenicq.forest.nodes import COURSE, GOING, LAST_LANE, RANK, WHO, Identity, LaneCourse, Leaf, Value
 from scenicq.forest.scenario import Scenario
 from scenicq.limits import LIMITS
@@ -34,13 +36,13 @@ from scenicq.match.problem.candidates import Candidates
 from scenicq.match.problem.constraints import Signature
 from scenicq.match.problem.label_elements import elements_of
 from scenicq.match.problem.map_lookups import MapLookups
-from scenicq.match.problem.observation import observe, observe_course, observed_names
+from scenicq.match.problem.observation import course_without_role, observe, observe_course, observed_names
 from scenicq.match.problem.outcome import Outcome
 from scenicq.match.search.group_plan import GroupPlan, MatchPlan
 from scenicq.store.labels import Label, LabelObject
 from scenicq.store.reader import LAST
 
-__all__ = ["FailedBatch", "FilledBatch", "FirstFit", "LabelRow", "first_fit_of", "signature_of"]
+__all__ = ["FailedBatch", "FilledBatch", "FirstFit", "LabelRow", "OpenBatch", "first_fit_of", "signature_of"]
 
 _SCALARS = frozenset({"heading", "width", "length", "height"})
 
@@ -84,6 +86,11 @@ class LabelRow:
         """What is observed of a label object that need not play a role; its course would take long to make."""
         seen = self.seen.get(number)
         return observe(_label_object(self.label, number)) if seen is None else seen
+
+    def course(self, number: int) -> Value:
+        """The course of a label object that need not play a role."""
+        known = self.seen.get(number, {}).get(COURSE)
+        return known or course_without_role(self.label, _label_object(self.label, number), self.courses)
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,6 +137,26 @@ class FailedBatch:
 
 
 @dataclass(frozen=True, slots=True)
+class OpenBatch:
+    """Labels that do not surely match, and match if what is not observed is right.
+
+    Attributes:
+        rows: The labels.
+        numbers: As in `FilledBatch`, for the first correspondence that nothing excludes.
+        groups: The first group of the plan that is open, for each label.
+    """
+
+    rows: Sequence[LabelRow]
+    numbers: Sequence[tuple[int, ...]]
+    groups: Sequence[Group]
+
+    def observed(self, place: int) -> Iterator[frozenset[str]]:
+        """The names of what is observed of each label object in the roles of a label."""
+        label = self.rows[place].label
+        return (_observed_of(label, _label_object(label, number)) for number in self.numbers[place])
+
+
+@dataclass(frozen=True, slots=True)
 class _Failure:
     """What failed furthest of a label.
 
@@ -164,8 +191,8 @@ class FirstFit:
 
     def fill(
         self, rows: Sequence[LabelRow], options: MatchOptions, lookups: MapLookups
-    ) -> Iterator[FilledBatch | FailedBatch]:
-        """The labels whose roles can be filled, or surely cannot, in batches; the others are left out.
+    ) -> Iterator[FilledBatch | FailedBatch | OpenBatch]:
+        """The labels whose roles can be filled, surely cannot, or may be, in batches; the others are left out.
 
         Labels without a match are left out where there are several roles: it takes a search to say what fails.
 
@@ -177,29 +204,66 @@ class FirstFit:
         Raises:
             Exhausted: The time is used up.
         """
+        opened, settled = set[int](), set[int]()
+        yield from self._fill(rows, options, lookups, opened, settled)
+        left = [row for row in rows if row.number in opened and row.number not in settled]
+        if left:
+            yield from self._fill(left, options, lookups)
+
+    def _fill(
+        self,
+        rows: Sequence[LabelRow],
+        options: MatchOptions,
+        lookups: MapLookups,
+        opened: set[int] | None = None,
+        settled: set[int] | None = None,
+    ) -> Iterator[FilledBatch | FailedBatch | OpenBatch]:
+        """As `fill`, without what is open, or with that alone.
+
+        Args:
+            rows: Labels of the plan.
+            options: Tolerance and radius.
+            lookups: What is known of the map.
+            opened: Gets the numbers of labels for which something was open and passed over; None: what is open is
+                taken for what holds.
+            settled: Gets the numbers of labels whose roles are filled, and of those of which something is not clear.
+        """
         todo = [_Batch(self, rows, [(0,)] * len(rows))]
         while todo:
             look()
             batch = todo.pop()
             depth = len(batch.numbers[0])
             for place, (group, form) in enumerate(self.due[depth - 1]):
-                holds, fails = batch.decide(group, form, options, lookups)
+                holds, fails, open_ = batch.decide(group, form, options, lookups)
                 if holds is True:
                     continue
                 if fails is not False:
                     failing = batch.where(fails)
-                    if len(self.order) <= 2:
+                    if len(self.order) <= 2 and opened is not None:
                         failing.note((depth, place), form)
-                        yield from failing.lost(options, lookups)
+                        yield from failing.lost(options, lookups, opened)
                     todo += failing.with_next_candidate()
+                if open_ is not False and opened is not None:
+                    passed = batch.where(open_)
+                    opened.update(row.number for row in passed.rows)
+                    todo += passed.with_next_candidate()
+                elif open_ is not False:
+                    batch.note_open(open_, self.plan.groups.index(group))
+                    holds = _either(holds, open_)
+                if settled is not None:
+                    settled.update(batch.unclear(holds, fails, open_))
                 if holds is False:
                     break
                 batch = batch.where(holds)
             else:
-                if depth == len(self.order):
-                    yield batch.filled()
-                else:
+                if depth < len(self.order):
                     todo += batch.with_next_role()
+                elif opened is None:
+                    yield batch.opened()
+                else:
+                    if settled is not None:
+                        settled.update(row.number for row in batch.rows)
+                    yield batch.filled()
 
 
 @dataclass(slots=True)
@@ -214,6 +278,7 @@ class _Batch:
         decisions: How many groups were decided for these labels.
         columns: What is observed of the label objects in the roles.
         failures: What failed furthest of each label, as far as it is noted.
+        opens: The place in the plan of the first group that is open of each label, as far as it is noted.
     """
 
     fit: FirstFit
@@ -225,20 +290,36 @@ class _Batch:
     decisions: int = 0
     columns: Columns | None = None
     failures: list[_Failure | None] | None = None
+    opens: list[int | None] | None = None
 
     def decide(
         self, group: GroupPlan, form: ClosedForm, options: MatchOptions, lookups: MapLookups
-    ) -> tuple[RowTruth, RowTruth]:
-        """For which labels a group surely holds, and for which it surely fails; keeps the witness."""
+    ) -> tuple[RowTruth, RowTruth, RowTruth]:
+        """For which labels a group surely holds, surely fails, and is open; keeps the witness."""
         size = len(self.rows)
         self.decisions += 1
         if self.decisions > self.fit.most_decisions:
-            return False, False
-        if size == 1:
-            holds, fails, self.values[group] = form.evaluate_one(self.get(0), options, lookups)
-            return holds, fails
-        holds, fails, self.values[group] = self.evaluate(form, options, lookups)
-        return _alike(_listed(holds, size)), _alike(_listed(fails, size))
+            return False, False, False
+        if size == 1 and not form.takes_columns:
+            holds, fails, self.values[group], open_ = form.evaluate_one(self.get(0), options, lookups)
+            return holds, fails, open_
+        holds, fails, self.values[group], open_ = self.evaluate(form, options, lookups)
+        return _alike(_listed(holds, size)), _alike(_listed(fails, size)), _alike(_listed(open_, size))
+
+    def unclear(self, *truths: RowTruth) -> Iterator[int]:
+        """The numbers of labels of which nothing is true."""
+        if True in truths:
+            return iter(())
+        told = [any(each) for each in zip(*(_listed(truth, len(self.rows)) for truth in truths), strict=True)]
+        return (row.number for row, known in zip(self.rows, told, strict=True) if not known)
+
+    def note_open(self, open_: RowTruth, place: int) -> None:
+        """Note that a group of the plan is open of some labels."""
+        before: list[int | None] = self.opens or [None] * len(self.rows)
+        self.opens = [
+            known if not mine else place if known is None else min(known, place)
+            for known, mine in zip(before, _listed(open_, len(self.rows)), strict=True)
+        ]
 
     def where(self, kept: RowTruth) -> _Batch:
         """The labels of which something is true: at least one."""
@@ -251,7 +332,8 @@ class _Batch:
         }
         rows, numbers = itertools.compress(self.rows, kept), itertools.compress(self.numbers, kept)
         failures = None if self.failures is None else [*itertools.compress(self.failures, kept)]
-        return _Batch(self.fit, [*rows], [*numbers], values, self.decisions, failures=failures)
+        opens = None if self.opens is None else [*itertools.compress(self.opens, kept)]
+        return _Batch(self.fit, [*rows], [*numbers], values, self.decisions, failures=failures, opens=opens)
 
     def note(self, depth: tuple[int, int], form: ClosedForm) -> None:
         """Note that a group fails of all labels, where nothing failed as far as that before."""
@@ -261,14 +343,14 @@ class _Batch:
             for known, mine in zip(before, self.numbers, strict=True)
         ]
 
-    def lost(self, options: MatchOptions, lookups: MapLookups) -> Iterator[FailedBatch]:
-        """The labels, all failing now, that have no other candidate, with what fails of them."""
+    def lost(self, options: MatchOptions, lookups: MapLookups, opened: Container[int]) -> Iterator[FailedBatch]:
+        """The labels, all failing now and none open, that have no other candidate, with what fails of them."""
         order, found = self.fit.order, dict[ClosedForm, list[int]]()
         if self.failures is None:
             return
         for number, (row, mine) in enumerate(zip(self.rows, self.numbers, strict=True)):
             failure = self.failures[number]
-            played = all(row.candidates[index] for index in order[1:])
+            played = row.number not in opened and all(row.candidates[index] for index in order[1:])
             if failure is not None and played and not _following(order, row.candidates, mine):
                 found.setdefault(failure.form, []).append(number)
         for form, some in found.items():
@@ -335,6 +417,16 @@ class _Batch:
         witnesses = list(zip(*columns, strict=True)) if columns else [()] * size
         return FilledBatch(self.rows, self.numbers, tuple(variables), witnesses)
 
+    def opened(self) -> OpenBatch:
+        """The labels with what is open of them: of those that hold altogether, nothing."""
+        rows, numbers, groups = list[LabelRow](), list[tuple[int, ...]](), list[Group]()
+        for row, mine, place in zip(self.rows, self.numbers, self.opens or [None] * len(self.rows), strict=True):
+            if place is not None:
+                rows.append(row)
+                numbers.append(mine)
+                groups.append(self.fit.plan.groups[place].group)
+        return OpenBatch(rows, numbers, groups)
+
     def get(self, number: int) -> Lookup:
         """The observed values of one label."""
         return _getter(self.rows[number], self.numbers[number], self.fit.ranks)
@@ -383,7 +475,10 @@ def _column(
         def seen(place: int, number: int) -> Mapping[str, Value]:
             return rows[place].observe_without_course(number)
 
-        some = functools.partial(elements_of, [row.label for row in rows], seen)
+        def course(place: int, number: int) -> Value:
+            return rows[place].course(number)
+
+        some = functools.partial(elements_of, [row.label for row in rows], seen, course)
         return cast(FloatColumn, functools.cache(some))
     rank = ranks[index]
     if name in WHO:
@@ -455,6 +550,15 @@ def _kept(values: Values, mask: NDArray[np.bool_], kept: Sequence[bool]) -> Floa
     )
 
 
+def _either(one: RowTruth, other: RowTruth) -> RowTruth:
+    """Where one of two is true."""
+    if isinstance(one, bool):
+        return True if one else other
+    if isinstance(other, bool):
+        return True if other else one
+    return _alike([a or b for a, b in zip(one, other, strict=True)])
+
+
 def _alike(values: list[T]) -> T | list[T]:
     """One value if all are equal, else the list."""
     return values[0] if values.count(values[0]) == len(values) else values
@@ -505,7 +609,7 @@ def signature_of(label: Label, ego: int, among: Candidates, relevant: tuple[froz
 
 
 def _observed_of(label: Label, label_object: LabelObject) -> frozenset[str]:
-    """What is observed of an object of a label; of what is recorded also its course."""
+    """What is observed of an object of a label, by name; of what is recorded also its course."""
     names = observed_names(label_object)
     return names if label.recorded is None else _with_course(names)
 

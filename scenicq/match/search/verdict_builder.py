@@ -6,7 +6,7 @@ the program a constraint stands.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from scenicq.budget import Exhausted
@@ -17,9 +17,9 @@ from scenicq.match.options import MatchOptions
 from scenicq.match.problem.constraints import describe_constraint, unobserved_motion
 from scenicq.match.problem.map_lookups import MapLookups
 from scenicq.match.problem.outcome import UNOBSERVED, Refuted, Undecided
-from scenicq.match.search.first_fit import FailedBatch, FilledBatch, FirstFit
+from scenicq.match.search.first_fit import FailedBatch, FilledBatch, FirstFit, OpenBatch
 from scenicq.match.search.label_search import Failure, LabelSearch, Solution
-from scenicq.match.verdict import Cause, Match, NoMatch, Unknown, WitnessValue
+from scenicq.match.verdict import Cause, Match, NoMatch, Unknown, Verdict, WitnessValue
 from scenicq.store.labels import Label
 
 __all__ = ["VerdictBuilder"]
@@ -55,13 +55,13 @@ class VerdictBuilder:
         return Match(self.names(label, solution.assignment), _witness(keys, [value for _, value in known]))
 
     def batch_verdicts(
-        self, fit: FirstFit, batch: FilledBatch | FailedBatch, lookups: MapLookups | None
-    ) -> Iterator[tuple[int, Match | NoMatch]]:
+        self, fit: FirstFit, batch: FilledBatch | FailedBatch | OpenBatch, lookups: MapLookups | None
+    ) -> Iterator[tuple[int, Verdict]]:
         """The verdicts of the labels that first fit decides.
 
         Args:
             fit: The plan of first fit.
-            batch: Labels that all match, or that all fail at one constraint.
+            batch: Labels that all match, that all fail at one constraint, or that are all open.
             lookups: What is known of the map, to say in detail why a label is no match. None: the constraint is enough.
 
         Yields:
@@ -70,6 +70,8 @@ class VerdictBuilder:
         """
         if isinstance(batch, FilledBatch):
             return self._batch_matches(fit, batch)
+        if isinstance(batch, OpenBatch):
+            return self._batch_unknowns(fit, batch)
         if lookups is not None:
             return self._detailed_failures(fit, batch, lookups)
         verdict = NoMatch(self._cause(Refuted(batch.constraint)))
@@ -82,6 +84,14 @@ class VerdictBuilder:
             objects = row.label.objects
             names = {name: objects[numbers[rank] - 1].id if numbers[rank] else "ego" for name, rank in ranks}
             yield row.number, Match(names, _witness(keys, values))
+
+    def _batch_unknowns(self, fit: FirstFit, batch: OpenBatch) -> Iterator[tuple[int, Unknown]]:
+        for place, (row, numbers, group) in enumerate(zip(batch.rows, batch.numbers, batch.groups, strict=True)):
+            names = [*batch.observed(place)]
+            assignment = {index: numbers[rank] for index, rank in fit.ranks.items()}
+            seen = {index: names[rank] for index, rank in fit.ranks.items()}
+            outcome = Undecided((group.doubtful or group.constraints)[0], UNOBSERVED)
+            yield row.number, self._unknown(row.label, assignment, seen, outcome)
 
     def _detailed_failures(
         self, fit: FirstFit, batch: FailedBatch, lookups: MapLookups
@@ -118,12 +128,18 @@ class VerdictBuilder:
 
     def undecided(self, label: Label, search: LabelSearch, failure: Failure) -> Unknown:
         """The verdict of a correspondence of which the search can say neither that it matches nor that it does not."""
-        reason = "" if isinstance(failure.outcome, Refuted) else failure.outcome.reason
         assignment = {self.scenario.ego: search.problem.ego} | dict(failure.assignment)
-        cause = self._cause(failure.outcome)
+        seen = {index: search.problem.seen[number] for index, number in assignment.items()}
+        return self._unknown(label, assignment, seen, failure.outcome)
+
+    def _unknown(
+        self, label: Label, assignment: Mapping[int, int], seen: Mapping[int, Container[str]],
+        outcome: Refuted | Undecided,
+    ) -> Unknown:  # fmt: skip
+        reason = "" if isinstance(outcome, Refuted) else outcome.reason
+        cause = self._cause(outcome)
         if reason == UNOBSERVED:
-            seen = {index: search.problem.seen[number] for index, number in assignment.items()}
-            cause = replace(cause, detail=unobserved_motion(self.scenario, seen, failure.constraint))
+            cause = replace(cause, detail=unobserved_motion(self.scenario, seen, outcome.constraint))
         return Unknown(reason, cause, self.names(label, assignment))
 
     def without_candidates(self, label: Label, ego: int, cause: Cause) -> NoMatch:

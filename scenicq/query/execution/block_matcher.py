@@ -18,11 +18,13 @@ from scenicq.forest.unobserved import MOTION
 from scenicq.geometry.network import Network
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.constraints import relevant_properties
-from scenicq.match.verdict import Match, Verdict
+from scenicq.match.problem.outcome import UNOBSERVED as REASON
+from scenicq.match.verdict import Cause, Match, Unknown, Verdict
 from scenicq.query.execution.lazy_solver import LazySolver
 from scenicq.query.execution.results import Result
 from scenicq.query.execution.sql_deadline import SqlWatch, sql_deadline
-from scenicq.query.prefilter.decision import decided_frames
+from scenicq.query.prefilter.condition_reader import course_column
+from scenicq.query.prefilter.decision import MATCHING, UNOBSERVED, decided_frames
 from scenicq.query.prefilter.executor import Block, keep_players, names, object_rows, run_players, run_prefilter
 from scenicq.query.prefilter.plan import LABELS, Plan, make_plan
 from scenicq.query.prefilter.survivors import Candidate, CandidateRows, candidate_rows, candidates
@@ -60,6 +62,7 @@ class CompiledMap:
         motion: Whether the scenario reads observed motion.
         observed: The properties of label objects that matter; None for all.
         whole: Whether all label objects matter, not only those that may play a role.
+        on_course: Whether it matters where label objects are on the ego's course.
         anywhere: Whether all but the network is the same over any map of the same traits.
     """
 
@@ -69,6 +72,7 @@ class CompiledMap:
     motion: bool = True
     observed: frozenset[str] | None = None
     whole: bool = False
+    on_course: bool = False
     anywhere: bool = False
 
     @classmethod
@@ -88,7 +92,8 @@ class CompiledMap:
         relevant = [names for each in every for names in relevant_properties(each, options)]
         observed = frozenset[str](asked or ()).union(*relevant)
         motion, whole = not MOTION.isdisjoint(observed), asked is not None or bool(scenario.variants)
-        return cls(scenario, network, plan, motion, observed, whole, not network.is_read)
+        on_course = any(course_column(each) for each in every)
+        return cls(scenario, network, plan, motion, observed, whole, on_course, not network.is_read)
 
     def over(self, scenario: Scenario, network: Network) -> CompiledMap:
         """Make the compiled map of another map with the same traits, from the scenario over that map."""
@@ -219,13 +224,14 @@ class Decider:
         return BlockOutcome(missed, self._matched(self._left(compiled)), named)
 
     def _partly_decided(self, compiled: CompiledMap) -> Iterator[list[Result]]:
-        """The results of the frames that the prefilter has left, where SQL says that some surely match."""
+        """The results of the frames that the prefilter has left, where SQL tells some of them."""
         rows = decided_frames(self.connection, compiled.plan.decision, LABELS, compiled.plan.left)
-        open_ = np.array([number for number, sure, *_ in rows if not sure], dtype=np.int64)
-        asked = self._matched(self._left(compiled, open_) if len(open_) else iter(()))
-        proved, none = Match({}, {}), dict[str, str]()
-        for _, sure, frame, recording, time in rows:
-            yield [Result(frame, recording, time, proved, none)] if sure else next(asked)
+        left = np.array([number for number, told, *_ in rows if not told], dtype=np.int64)
+        asked = self._matched(self._left(compiled, left) if len(left) else iter(()))
+        verdicts: dict[int, Verdict] = {MATCHING: Match({}, {}), UNOBSERVED: Unknown(REASON, Cause(""))}
+        none = dict[str, str]()
+        for _, told, frame, recording, time in rows:
+            yield [Result(frame, recording, time, verdicts[told], none)] if told else next(asked)
 
     def _left(self, compiled: CompiledMap, among: NDArray[np.int64] | None = None) -> Iterator[Candidate]:
         """The labels that the prefilter has left, with as much of each as the matcher looks at."""
@@ -239,6 +245,7 @@ class Decider:
             among=among,
             recorded=recorded,
             whole=whole,
+            on_course=compiled.on_course,
         )
 
     def _recordings(self, compiled: CompiledMap, block: Block) -> BlockOutcome:
@@ -266,7 +273,7 @@ class Decider:
                     kept.append(True)
                 return candidates(
                     connection, plan, motion=compiled.motion, among=wanted, recorded=self.dataset.recorded,
-                    whole=compiled.whole,
+                    whole=compiled.whole, on_course=compiled.on_course,
                 )  # fmt: skip
         else:
             missed = run_prefilter(self.dataset, connection, plan, block)
@@ -276,7 +283,7 @@ class Decider:
             def read(wanted: NDArray[np.int64]) -> Iterator[Candidate]:
                 return candidates(
                     connection, plan, motion=compiled.motion, among=wanted, recorded=self.dataset.recorded,
-                    whole=compiled.whole,
+                    whole=compiled.whole, on_course=compiled.on_course,
                 )  # fmt: skip
 
         left = Survivors(every[missed < 0], rows, plan.roles or (), read)

@@ -16,6 +16,7 @@ from scenicq.forest.among import properties_of_others
 from scenicq.forest.scenario import Scenario
 from scenicq.match.matcher import Matcher
 from scenicq.match.problem.constraints import relevant_properties
+from scenicq.match.tolerance import SLACK
 from scenicq.match.verdict import Cause, Match, NoMatch, Unknown, Verdict, WitnessValue
 from scenicq.query.execution.recording_starts import (
     DecidedStart,
@@ -37,7 +38,7 @@ from scenicq.temporal.hidden_runs import StartLabel
 from scenicq.temporal.intervals import IntervalMatcher, IntervalVerdict
 from scenicq.temporal.necessary import NecessaryConditions
 from scenicq.temporal.outcomes import Outcome
-from scenicq.temporal.starts import RoleCandidates, StartSearch, narrow_candidates, start_matchers
+from scenicq.temporal.starts import RoleCandidates, StartMatchers, StartSearch, narrow_candidates
 from scenicq.temporal.stretches import StartTable
 from scenicq.temporal.truth import TRUE, UNKNOWN
 
@@ -183,9 +184,9 @@ class RecordingMatcher:
         if len(outcomes) == 1:
             # what is decided over time alone is no matter of the initial scene
             self.matcher = Matcher(outcomes[0].scenario, self.matcher.options, self.matcher.solver)
-        whole, *self._matchers = start_matchers(self.matcher, [Outcome(self.matcher.scenario, {}), *outcomes])
-        self.matcher = whole
-        self._search = StartSearch(whole)
+        self._matchers = StartMatchers(self.matcher, outcomes)
+        self.matcher = self._matchers.whole
+        self._search = StartSearch(self.matcher)
         self._searches: dict[int, StartSearch] = {}
         self._relevant = relevant_properties(self.matcher.scenario, self.matcher.options)
 
@@ -250,9 +251,31 @@ class RecordingMatcher:
             if outcome.same_start:
                 again = replace(whole.table, outcomes=np.full(len(whole.table), number))
                 parts.append(replace(whole, table=again))
-            else:
-                parts.append(self._starts(some, self._search_of(number), number, DecidedRecordings()))
-        return _Starts.joined(parts)
+                continue
+            near = self._near(some, outcome)
+            if near.any():
+                parts.append(self._starts(some.some(near), self._search_of(number), number, DecidedRecordings()))
+        none = _Starts(start_table(self.matcher.scenario, asked.block, {}, [], 0), {}, {})
+        return _Starts.joined(parts or [none])
+
+    def _near(self, asked: _Asked, outcome: Outcome) -> NDArray[np.bool_]:
+        """The labels that have, for each role, a label object where an outcome may put it: a lane is not everywhere."""
+        candidates, n = asked.candidates, len(asked.labels)
+        found = np.ones(n, np.bool_)
+        if candidates is None:
+            return found
+        x, y = asked.block.numbers("x"), asked.block.numbers("y")
+        place = np.searchsorted(candidates.labels, asked.block.label_of[candidates.members])
+        for role, box in outcome.start_boxes.items():
+            reach = self.matcher.options.tolerance.of(role, "position").reach + SLACK
+            is_ego = role == self.matcher.scenario.ego
+            members = asked.block.ego(asked.labels) if is_ego else candidates.members[candidates.may[role]]
+            (west, east), (south, north) = box
+            off_x = (x[members] < west - reach) | (x[members] > east + reach)
+            off_y = (y[members] < south - reach) | (y[members] > north + reach)
+            inside = ~(off_x | off_y)
+            found &= inside if is_ego else np.bincount(place[candidates.may[role]][inside], minlength=n) > 0
+        return found
 
     def _search_of(self, outcome: int) -> StartSearch:
         """What finds the starts with an outcome of the choices over time."""

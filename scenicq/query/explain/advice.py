@@ -281,7 +281,10 @@ def _outlook(options: QueryOptions, sample: _Sample, change: Change, solver: Laz
         if not count or looked_at >= most or time_is_up():
             continue
         matcher = Matcher(world.scenario, changed.match, solver)
-        left_over = candidates(connection, world.plan, motion=world.motion, recorded=sample.recorded, whole=world.whole)
+        left_over = candidates(
+            connection, world.plan, motion=world.motion, recorded=sample.recorded, whole=world.whole,
+            on_course=world.on_course,
+        )  # fmt: skip
         labels = islice(left_over, most - looked_at)
         for verdict in matcher.match_all([(each.label, each.among) for each in labels]):
             looked_at += 1

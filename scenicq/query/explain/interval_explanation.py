@@ -29,7 +29,7 @@ from scenicq.store.labels import Label
 from scenicq.store.track_block import TrackBlock
 from scenicq.store.tracks import RecordingTracks, TrackKey, TrackReader
 from scenicq.temporal.intervals import IntervalMatcher, IntervalVerdict
-from scenicq.temporal.starts import start_matchers
+from scenicq.temporal.starts import StartMatchers
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN
 
 __all__ = ["IntervalExplanation", "changes_of", "explain_beginning", "explain_recording", "locate_interval"]
@@ -207,7 +207,7 @@ def _explain_variant(
     with TrackReader(query.dataset, part) as reader:
         tracks = reader.read(first, end)
     intervals = IntervalMatcher(scenario, query.options.match, query.options.time, solver)
-    matchers = start_matchers(Matcher(scenario, query.options.match, solver), intervals.outcomes)
+    matchers = StartMatchers(Matcher(scenario, query.options.match, solver), intervals.outcomes)
     # an interval of a program about one instant is made of frames that all match
     dynamic = scenario.dynamics is not None
     time_us = None if begins is None else frame_time(name, tracks.times_us.tolist(), begins)
@@ -227,8 +227,8 @@ def _explain_variant(
             causes: list[str] = []
             unknown: list[str] = []
             before = len(starts)
-            for outcome, matcher in enumerate(matchers):
-                findings = find_starts(matcher, label, known)
+            for outcome in range(len(intervals.outcomes)):
+                findings = find_starts(matchers[outcome], label, known)
                 found = [*decided_starts(scenario, block, label, members, findings)]
                 starts += [(each, outcome) for each in found if isinstance(each, DecidedStart)]
                 unknown = [each.reason for each in found if isinstance(each, Unknown)] or unknown

@@ -95,6 +95,7 @@ class ColumnCondition:
         region: For a condition on memberships: SQL that holds of some row of the object's (or the ego's).
         what: The feature or requirement, in the words of the program.
         span: Where the program says it.
+        open: SQL that is true where what is not observed would tell, of a condition that is to prove something.
     """
 
     objects: tuple[int, ...]
@@ -102,6 +103,7 @@ class ColumnCondition:
     region: str = ""
     what: str = ""
     span: Span | None = None
+    open: SqlTruth = False
 
 
 def object_columns(alias: str, prefix: str = "") -> dict[str, str | tuple[str, str]]:
@@ -351,7 +353,7 @@ class ConditionReader:
 
     def _turn(self, index: int, region: Select, heading: Node | None) -> float | None:
         """How far the lane that an object is in may, or must at most, lead from its heading; None for any way."""
-        if heading is None or not is_along(heading, region, index):
+        if heading is None or not is_along(heading, region, index, self.road):
             return None
         width = self._width(index, "heading")
         return _NO_TURN if width is None else width if self.proving else width + SLACK

@@ -11,12 +11,16 @@ from dataclasses import replace
 from itertools import chain
 
 from scenicq.errors import Span
+from scenicq.forest import build
+from scenicq.forest.among import asks_each_once, asks_others
 from scenicq.forest.groups import PARAMS, Comparison, Condition, Group
-from scenicq.forest.nodes import Node, PointIn, Select
+from scenicq.forest.nodes import Logic, LogicOp, Node, PointIn, Select
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.unobserved import is_only_observed
 from scenicq.forest.walk import conjuncts, postorder
+from scenicq.geometry.abstract_map import AbstractOccupancy
 from scenicq.geometry.network import Network
+from scenicq.geometry.road_direction import RoadDirection
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.constraints import build_groups, compared_properties, relevant_properties
 from scenicq.query.prefilter.condition_reader import (
@@ -27,6 +31,7 @@ from scenicq.query.prefilter.condition_reader import (
     object_columns,
 )
 from scenicq.query.prefilter.map_relations import (
+    LookUp,
     MapRelations,
     MeantElements,
     allowed_elements,
@@ -35,6 +40,7 @@ from scenicq.query.prefilter.map_relations import (
     shared_look_ups,
 )
 from scenicq.query.prefilter.other_objects import conditions_of, proof, role_conditions
+from scenicq.query.prefilter.sql_ends import all_of, any_of
 from scenicq.store.classes import Granularity
 from scenicq.store.sql import sql_text
 
@@ -116,7 +122,8 @@ def sufficient_conditions(
     signature = (*told, frozenset[str]())
     for group in build_groups(scenario, signature, options):
         # what is known up to two ends must hold whichever it is
-        found += _proof(group.certain_group, reader, scenario, options.classes)
+        proved = [*_proof(group.certain_group, reader, scenario, options.classes)]
+        found += _told_apart(proved, group, reader, scenario, options.classes)
     if any(each.sql is False for each in found):
         return None
     return tuple(each for each in found if each.region or each.sql is not True)
@@ -142,11 +149,12 @@ def _proof(
 ) -> Iterator[ColumnCondition]:
     """What proves that all constraints of a group can be satisfied together."""
     comparisons = [each for each in group.constraints if isinstance(each, Comparison)]
-    along = next((each for each in comparisons if any(_is_told_by(each, place) for place in comparisons)), None)
+    told = (each for each in comparisons if any(_is_told_by(each, place, reader.road) for place in comparisons))
+    along = next(told, None)
     if len(comparisons) > 1 + (along is not None) or any(each.object == PARAMS for each in comparisons):
         yield ColumnCondition((), False)
         return
-    meant = _meant_elements(group, scenario.ego)
+    meant = _meant_elements(group, scenario.ego, along)
     for constraint in group.constraints:
         if isinstance(constraint, Condition):
             for part in conditions_of(constraint.expression):
@@ -159,17 +167,63 @@ def _proof(
             yield from reader.comparison(constraint, meant, None if along is None else along.expression)
 
 
-def _is_told_by(heading: Comparison, place: Comparison) -> bool:
+def _told_apart(
+    proved: Sequence[ColumnCondition], group: Group, reader: ConditionReader, scenario: Scenario, classes: Granularity
+) -> Sequence[ColumnCondition]:
+    """What proves a group, as one condition that also says where the group is surely open, if SQL can tell that."""
+    if len(group.constraints) != 1 or not isinstance(group.constraints[0], Condition):
+        return proved
+    possible, certain = (each.constraints[0].expression for each in (group, group.certain_group))
+    parts = [*conditions_of(certain)]
+    asking = asks_others(possible)
+    # what two conditions on others have in common takes a search; what is known of both kinds, too
+    if asking is not (possible is certain) or not asks_each_once(possible):
+        return proved
+    holds = [each for part in conditions_of(possible) for each in _possibly(part, reader, scenario, classes)]
+    fails = [[*_possibly(_opposite(part), reader, scenario, classes)] for part in parts]
+    told = [*proved, *holds, *(each for some in fails for each in some)]
+    about = {index for each in told for index in each.objects}
+    if len(about) > 1 or any(each.region for each in told):
+        return proved
+    failing = any_of([all_of([each.sql for each in some]) for some in fails])
+    open_ = all_of([*(each.sql for each in holds), failing])
+    return [ColumnCondition(tuple(about), all_of([each.sql for each in proved]), open=open_)]
+
+
+def _opposite(part: Node) -> Node:
+    """The opposite of a condition, without negations of negations."""
+    is_negation = isinstance(part, Logic) and part.op is LogicOp.NOT
+    return part.args[0] if isinstance(part, Logic) and is_negation else build.opposite(part)
+
+
+def _possibly(
+    part: Node, reader: ConditionReader, scenario: Scenario, classes: Granularity
+) -> Iterator[ColumnCondition]:
+    """What proves that a condition holds for something of what is not known."""
+    found = proof(part, scenario, classes, possibly=True)
+    if found is not None:
+        yield found
+    else:
+        yield from reader.requirement(part)
+
+
+def _is_told_by(heading: Comparison, place: Comparison, road: RoadDirection) -> bool:
     """Whether a heading is the direction of the lane that an object is in, which is told together with the lane."""
     about = (place.property, heading.property, heading.object) == ("position", "heading", place.object)
     node = place.expression
-    return about and isinstance(node, PointIn) and is_along(heading.expression, node.region, place.object)
+    return about and isinstance(node, PointIn) and is_along(heading.expression, node.region, place.object, road)
 
 
-def _meant_elements(group: Group, ego: int) -> MeantElements | None:
+def _meant_elements(group: Group, ego: int, along: Comparison | None) -> MeantElements | None:
     """Which elements may be meant where the ego is, for all that a group asks of them together; None of none.
 
-    Where conditions look up elements of several kinds, it is not known which of each go together.
+    Where conditions look up elements of several kinds, it is not known which of each go together; nor of one that is
+    drawn, which of several is meant by two of them.
+
+    Args:
+        group: The group.
+        ego: Index of the ego.
+        along: A heading that is told together with the place.
     """
     said = [each.expression for each in group.constraints if isinstance(each, Condition)]
     equations = [places for each in said if (places := shared_look_ups(each)) is not None]
@@ -185,23 +239,37 @@ def _meant_elements(group: Group, ego: int) -> MeantElements | None:
     found += [look_up for look_up, _ in allowed]
     if not found:
         return None
-    objects = {each.object for each in found}
-    alike = all(each.occupancy is found[0].occupancy for each in found)
-    if not alike or ego not in objects or len(objects) != 1 + len(equations):
-        return MeantElements(None, 1)
-    among = frozenset(range(found[0].occupancy.nothing)).intersection(*(numbers for _, numbers in allowed))
     # what several ask for is one element: of several at the place each might be met by another one
     asking = sum(
         allowed_elements(part) is None and any(_looks_up(node) for node in postorder((part,)))
         for each in group.constraints
+        if each is not along
         for part in conjuncts(each.expression)
     )
-    return MeantElements(among, min(each.ranks for each in found) if asking <= 1 else 1, shared=bool(equations))
+    if asking > 1 and any(_is_drawn(each) for each in found):
+        return None
+    objects = {each.object for each in found}
+    alike = all(each.occupancy is found[0].occupancy for each in found)
+    ranks = min(each.ranks for each in found) if asking <= 1 else 1
+    if not alike or ego not in objects or len(objects) != 1 + len(equations):
+        # which of those at each place is meant matters where more is asked of it than that it is there
+        more = any(
+            numbers != some or not any(one.is_same(place) for places in equations for place in places)
+            for one, numbers in allowed
+        )
+        return MeantElements(None, 1 if more else ranks)
+    among = frozenset(range(found[0].occupancy.nothing)).intersection(*(numbers for _, numbers in allowed))
+    return MeantElements(among, ranks, shared=bool(equations))
 
 
 def _looks_up(node: Node) -> bool:
     """Whether a node is the number of the element that lies somewhere."""
     return look_up_of(node) is not None
+
+
+def _is_drawn(look_up: LookUp) -> bool:
+    """Whether the element is one of several, at random."""
+    return isinstance(look_up.occupancy, AbstractOccupancy) and look_up.occupancy.is_drawn
 
 
 def _lacks(column: str, names: Sequence[str]) -> str | bool:

@@ -31,13 +31,15 @@ from scenicq.forest.nodes import (
     Index,
     Node,
     Select,
+    Undefined,
 )
 from scenicq.forest.walk import children, is_leaf
-from scenicq.geometry.abstract_map import AbstractArea, AbstractOccupancy, LinkedFrom
+from scenicq.geometry.abstract_map import AbstractArea, AbstractOccupancy, LinkedFrom, led_kind
 from scenicq.geometry.angles import ALONG
-from scenicq.geometry.links import DIRECTS, IS_SECTION, LINKS
+from scenicq.geometry.links import DIRECTS, IS_SECTION
 from scenicq.geometry.occupancy import TOLERANCE, ElementAtPoint, Occupancy
 from scenicq.geometry.regions import PolygonSet, Region
+from scenicq.geometry.road_direction import RoadDirection
 from scenicq.limits import LIMITS
 from scenicq.match.tolerance import SLACK
 from scenicq.query.prefilter.regions import RegionNames, among_names, region_ids
@@ -50,6 +52,8 @@ _AT = f"distance <= {number(TOLERANCE + SLACK)}"
 """An element that may be found at a place."""
 _OF_LANES = ("lane_group", "road")
 """The kinds of elements whose direction is that of their lane at a place."""
+_DIRECTED = ("lane", "lane_section", *_OF_LANES)
+"""The kinds of elements of which it is known how far they lead from a heading."""
 _TURNED = "turned"
 """The table of how far the lanes in which objects are, of groups and roads, lead from their headings."""
 _EVERY_RANK = 1 << 30
@@ -116,13 +120,14 @@ def _of_rank(node: Node) -> LookUp | None:
             return None
 
 
-def is_along(heading: Node, region: Node, object: int) -> bool:
-    """Whether a heading is the direction where an object is of the very lane that a region is.
+def is_along(heading: Node, region: Node, object: int, road: RoadDirection) -> bool:
+    """Whether a heading is the direction where an object is of the very lane, or section of one, that a region is.
 
     Args:
         heading: The heading.
         region: The region.
         object: The object, by index.
+        road: The map's direction of the road, which is that of no lane alone.
     """
     match heading, region:
         case (
@@ -137,29 +142,26 @@ def is_along(heading: Node, region: Node, object: int) -> bool:
         return False
     occupancy = look_up.occupancy
     if isinstance(occupancy, AbstractOccupancy):
-        return occupancy.kind in ("lane", *_OF_LANES) and _is_of_area(fields.options[0], areas.options[0])
+        return occupancy.kind in _DIRECTED and _is_of_area(fields.options[0], areas.options[0], road)
     if not occupancy.is_of_lanes:
         return False
-    layer, *others = occupancy.layers
-    if others:
-        return False
-    return all(
-        isinstance(area, Constant)
-        and isinstance(field, Constant)
-        and isinstance(area.value, PolygonSet)
-        and area.value.orientation is field.value is occupancy.ways[0][owner]
-        for _, number, owner in layer
-        for area, field in ((areas.options[number], fields.options[number]),)
-    )
+    # of what is no lane it is not known how far it leads from a heading
+    pairs = list(zip(areas.options, fields.options, strict=True))[: occupancy.nothing]
+    return all(_is_undefined(area) or _is_of_area(field, area, road) for area, field in pairs)
 
 
-def _is_of_area(field: Node, area: Node) -> bool:
-    """Whether a direction is that of any element whose area another one is."""
+def _is_of_area(field: Node, area: Node, road: RoadDirection) -> bool:
+    """Whether a direction is that of the one element whose area another one is."""
     match field, area:
-        case Constant(value=direction), Constant(value=AbstractArea() as found):
-            return direction is found.orientation
+        case Constant(value=direction), Constant(value=PolygonSet() as found) if direction is not road:
+            return direction is found.orientation and (isinstance(found, AbstractArea) or len(found.ids) == 1)
         case _:
             return False
+
+
+def _is_undefined(area: Node) -> bool:
+    """Whether there is no such area."""
+    return isinstance(area, Constant) and isinstance(area.value, Undefined)
 
 
 @functools.lru_cache(maxsize=256)
@@ -184,7 +186,8 @@ def allowed_elements(root: Node) -> tuple[LookUp, frozenset[int]] | None:
     count = look_up.occupancy.nothing + 1
     numbers = Column(np.arange(count, dtype=np.float64), np.full(1, DEFINED))
     try:
-        found = interpret(steps_of(root, known=inner), _TABULATED, dict.fromkeys(inner, numbers))[id(root)]
+        domain = ColumnDomain(_absent, _absent, first_direction)
+        found = interpret(steps_of(root, known=inner), domain, dict.fromkeys(inner, numbers))[id(root)]
     except CannotEvaluate:
         return None
     if bool((found.status == UNKNOWN).any()):
@@ -201,10 +204,6 @@ def _among(look_up: LookUp, required: Sequence[Node]) -> frozenset[int]:
 
 def _absent(node: Node, *_: object) -> Column:
     raise CannotEvaluate(f"{type(node).__name__} is none of the element's")
-
-
-_TABULATED = ColumnDomain(_absent, _absent, first_direction)
-"""What conditions are for each element, where they hang on nothing else."""
 
 
 def shared_look_ups(node: Node) -> tuple[LookUp, LookUp] | None:
@@ -317,6 +316,10 @@ class MapRelations:
         regions = {place: ids for place, ids in regions.items() if place in among}
         if not meant.most and look_up.occupancy.nothing in regions:
             return None
+        first = region.options[0]
+        if isinstance(first, Constant) and isinstance(first.value, AbstractArea):
+            # what lies there may lead to the region
+            look_up = replace(look_up, occupancy=first.value.found)
         table = self._table(look_up, regions, meant.most)
         if table is None:
             return None
@@ -329,8 +332,9 @@ class MapRelations:
             if meant.most:
                 return f"({near} AND (q.f, q.object, region) IN ({rows} <= {number(turn)}))"
             return f"({near} AND (q.f, q.object, region) NOT IN ({rows} > {number(turn)}))"
-        # it is not known of those beside a lane
-        led = f"turn <= {number(turn)}" if meant.most else f"coalesce(turn <= {number(turn)}, true)"
+        # it is not known of those beside a lane; sections with lines of their own have directions of their own
+        led = f"coalesce(section_turn, turn) <= {number(turn)}"
+        led = led if meant.most else f"coalesce({led}, true)"
         return f"({near} AND {led})"
 
     def may_hold(self, look_up: LookUp, numbers: frozenset[int], required: Sequence[Node]) -> str | None:
@@ -439,8 +443,6 @@ class MapRelations:
             if not isinstance(option, Constant):
                 return None
             if isinstance(option.value, AbstractArea):
-                if option.value.found is not look_up.occupancy:
-                    return None
                 meant[place] = ("",)
             elif isinstance(option.value, Region):
                 ids = region_ids(option.value, self.names)
@@ -545,8 +547,10 @@ def _led_to(start: LinkedFrom, table: _Table, at: str, maps: str, links: str) ->
     else:
         at = f"SELECT * FROM ({at}) WHERE kind = {sql_text(start.kind)}"
     joined, region, kind = "", "e.region", start.kind
-    for step, link in enumerate(start.links):
+    for step, (link, within) in enumerate(start.links):
         own = f"l{step}.kind = {sql_text(kind)} AND l{step}.link = {sql_text(link)}"
+        if within is not None:
+            own += f" AND l{step}.begins <= {number(within)}"
         joined += f" JOIN {links} l{step} ON l{step}.map = e.map AND l{step}.region = {region} AND {own}"
-        region, kind = f"l{step}.target", LINKS[kind][link]
+        region, kind = f"l{step}.target", led_kind(kind, link)
     return f"SELECT e.f, e.object, {region} AS region FROM ({_meant(at, table) if table.most else at}) e{joined}"

@@ -16,6 +16,7 @@ from scenicq.forest.nodes import (
     ELEMENT,
     GIVEN,
     IDENTITY,
+    OPEN,
     Among,
     AmongOp,
     Compare,
@@ -107,15 +108,16 @@ def role_conditions(root: Node, scenario: Scenario, classes: Granularity) -> Ite
             yield found.as_column_condition
 
 
-def proof(part: Node, scenario: Scenario, classes: Granularity) -> ColumnCondition | None:
+def proof(part: Node, scenario: Scenario, classes: Granularity, *, possibly: bool = False) -> ColumnCondition | None:
     """What proves a condition on label objects; None where SQL cannot tell.
 
     Args:
-        part: The condition, one of `conditions_of`.
+        part: The condition, one of `conditions_of`, or the opposite of one.
         scenario: The scenario; the ego is that of the label.
         classes: How classes are compared.
+        possibly: Whether it is enough that it holds for something of what is not known of them.
     """
-    found = _read(part, scenario, classes, proving=True)
+    found = _read(part, scenario, classes, proving=True, possibly=possibly)
     return found.as_column_condition if isinstance(found, OtherCondition) else found
 
 
@@ -135,7 +137,7 @@ def conditions_of(root: Node) -> Iterator[Node]:
 
 
 def _read(
-    part: Node, scenario: Scenario, classes: Granularity, *, proving: bool
+    part: Node, scenario: Scenario, classes: Granularity, *, proving: bool, possibly: bool = False
 ) -> OtherCondition | ColumnCondition | None:
     """What a condition says of label objects, or of a role alone; None where SQL cannot tell."""
     ego = scenario.ego
@@ -174,30 +176,43 @@ def _read(
     parts = [] if every else list(conjuncts(body))
     own = [each for each in parts if _is_same(each, role, CompareOp.EQ)]
     excluded = {each.object for each in node.inputs[: node.excluded] if isinstance(each, Feature)}
-    if role is not None and own and not negated and node.number == 1 and role not in excluded:
+
+    def counts(asked: Node, *, most: bool, alias: str = OTHER) -> str:
+        """SQL that is true of all that count, or of those alone that surely do; or of those that may."""
+        if possibly:
+            asked = _with_truth(asked, most is every)
+        may = most is not every
+        held = bounds.can_hold(asked) if may else bounds.can_fail(asked)
+        of_class = _of_class(node.category, classes, 1 if most is not possibly else 2, alias)
+        return _and(of_class, held if most else SQL.negation(held), unknown=most)
+
+    few = negated or every
+    if role is not None and own and node.number == 1 and role not in excluded:
         asked = _of_role(connect(LogicOp.AND, [each for each in parts if each not in own]), role)
-        holds = SQL.negation(bounds.can_fail(asked)) if proving else bounds.can_hold(asked)
-        of_class = _of_class(node.category, classes, 2 if proving else 1, "a")
-        return ColumnCondition((role,), _and(of_class, holds, unknown=not proving))
+        found = counts(asked, most=negated is proving, alias="a")
+        return ColumnCondition((role,), f"NOT {found}" if negated else found)
     apart = [each for each in parts if _is_same(each, role, CompareOp.NE)]
     if apart:
         body = connect(LogicOp.AND, [each for each in parts if each not in apart])
     # of those who are all that is known is that some may play a role
     roles = node.excluded - 1 - (role in excluded)
-    few = negated or every
-    if few == proving:
-        # those that may count
-        may = bounds.can_fail(body) if every else bounds.can_hold(body)
-        counted = _and(_of_class(node.category, classes, 1), may, unknown=True)
-    else:
-        surely = bounds.can_hold(body) if every else bounds.can_fail(body)
-        counted = _and(_of_class(node.category, classes, 2), SQL.negation(surely), unknown=False)
+    counted = counts(body, most=few is proving)
     if apart or role in excluded:
         counted = f"({counted} AND {OTHER}.number <> a.number)"
     least = 1 if every else node.number
     if few:
         return OtherCondition(role, counted, most=least - 1 + (0 if proving else roles))
     return OtherCondition(role, counted, least + (roles if proving else 0))
+
+
+def _with_truth(root: Node, truth: bool) -> Node:
+    """A condition on a label object where what is not known of it has a truth value."""
+
+    def put_in(node: Node) -> Node:
+        is_open = isinstance(node, Feature) and node.object == ELEMENT and node.property == OPEN
+        return Constant(truth) if is_open else node
+
+    return transform(root, put_in)
 
 
 def _of_role(root: Node, role: int) -> Node:

@@ -344,7 +344,7 @@ def _regions(
             f"WHERE ({placed}) AND n.{left}"
         )
     rows = (
-        f"SELECT q.f, m.object, m.kind, m.region, m.distance, m.turn FROM {MEMBERSHIPS} m "
+        f"SELECT q.f, m.object, m.kind, m.region, m.distance, m.turn, m.section_turn FROM {MEMBERSHIPS} m "
         f"JOIN ({' UNION ALL '.join(asked)}) q ON m.frame = q.frame AND m.object = q.object"
     )
     statements: list[str] = []

@@ -15,7 +15,7 @@ from scenicq.match.problem.observation import IN_COLUMNS
 from scenicq.query.prefilter.plan import LABELS, OBJECTS, SENSORS, Plan
 from scenicq.store.in_memory import fetch_columns
 from scenicq.store.labels import Label
-from scenicq.store.reader import LABEL_COLUMNS, LAST, MOTION_COLUMNS, OBJECT_COLUMNS, assemble
+from scenicq.store.reader import COURSE_COLUMNS, LABEL_COLUMNS, LAST, MOTION_COLUMNS, OBJECT_COLUMNS, assemble
 from scenicq.store.recorded_tracks import RecordedTracks
 from scenicq.store.schema import ArrowTable
 
@@ -86,6 +86,7 @@ def candidates(
     observed: Collection[str] | None = None,
     among: NDArray[np.int64] | None = None,
     whole: bool = False,
+    on_course: bool = False,
     recorded: RecordedTracks | None = None,
 ) -> Iterator[Candidate]:
     """The labels that are left of the block on which the prefilter was run last, in order.
@@ -97,6 +98,7 @@ def candidates(
         observed: Of label objects only class, position and these properties are read; None for all that is known.
         among: Rows of `labels`: only these; None for all.
         whole: Whether labels have all their objects, not only those that may play a role.
+        on_course: Whether it is read where label objects are on the ego's course.
         recorded: What labels name as that which has the tracks of their recordings.
     """
     left = f"(SELECT f FROM {plan.stages[-1].table} WHERE missed IS NULL)"
@@ -105,7 +107,7 @@ def candidates(
         left = f"{left[:-1]} AND f IN (SELECT f FROM wanted))"
     chosen = [*_columns(observed), *(MOTION_COLUMNS if motion else [])]
     of_frames = ", ".join(f"l.{name}" for name in (*LABEL_COLUMNS, *(f"ego_{name}" for name in chosen[1:])))
-    of_objects = ", ".join(f"a.{name}" for name in chosen)
+    of_objects = ", ".join(f"a.{name}" for name in (*chosen, *(COURSE_COLUMNS if on_course else ())))
     frames = _rows(connection, f"SELECT l.number, {of_frames} FROM {LABELS} l WHERE l.number IN {left} ORDER BY 1")
     mine = f"JOIN {LABELS} l ON s.frame = l.frame WHERE l.number IN {left} ORDER BY s.number"
     # datasets without sensor files are many

@@ -41,7 +41,7 @@ def apart(body: Body) -> Body:
     """Statements each of which is one of its own."""
     return [
         Said(
-            [(atom, apart(block)) for atom, block in part] if word == "try" and number == 1 else apart(part)
+            [(atom, apart(block)) for atom, block in part] if word in ("try", "catch") and number == 1 else apart(part)
             if isinstance(part, list) and part and isinstance(part[0], tuple) else part
             for number, part in enumerate((word, *rest), -1)
         )
@@ -57,6 +57,22 @@ class Rejection(Exception):
     """The run is none."""
 
 
+class Raised(Rejection):
+    """The run is none unless a handler catches what is raised."""
+
+
+CAUGHT = {
+    "": ("require", "precondition", "invariant"),
+    " Exception": ("require", "precondition", "invariant"),
+    " RejectSimulationException": ("require",),
+    " GuardViolation": ("precondition", "invariant"),
+    " PreconditionViolation as error": ("precondition",),
+    " (ValueError, InvariantViolation)": ("invariant",),
+    " KeyError": (),
+}
+"""What each handler catches."""
+
+
 # --- drawing programs
 
 
@@ -64,9 +80,13 @@ def random_body(draw: random.Random, names: list[str], depth: int, *, loop: bool
     found: Body = []
     atom = lambda: draw.randrange(ATOMS)  # noqa: E731
     words = ["wait", "take", "flag", "if flag", "require", "terminate", "for", "until"]
-    words += ["if", "while", "try", "try"] * bool(depth) + ["do", "do until", "do for", "choose", "shuffle"] * bool(
-        names
-    )
+    words += ["if", "while", "try", "try", "catch", "catch"] * bool(depth) + [
+        "do",
+        "do until",
+        "do for",
+        "choose",
+        "shuffle",
+    ] * bool(names)
     words += ["break"] * loop + ["abort", "abort"] * inside + ["return"]
     for _ in range(draw.randint(1, 3)):
         word = draw.choice(words)
@@ -90,6 +110,13 @@ def random_body(draw: random.Random, names: list[str], depth: int, *, loop: bool
                 # a loop is not left from within, so that bodies can be taken apart
                 handlers = [(atom(), below(inside=True)) for _ in range(draw.randint(1, 2))]
                 found.append(("try", below(inside=True), handlers))
+            case "catch":
+                handlers = [(kind, below()) for kind in draw.sample([*CAUGHT], draw.randint(0, 2))]
+                # one without a name comes last
+                handlers.sort(key=lambda each: not each[0])
+                orelse = below() if handlers and draw.random() < 0.5 else []
+                final = below() if not handlers or draw.random() < 0.5 else []
+                found.append(("catch", below(), handlers, orelse, final))
             case "do" | "choose" | "shuffle":
                 found.append(
                     (word, draw.sample(names, draw.randint(1, len(names))) if word != "do" else [draw.choice(names)])
@@ -164,6 +191,14 @@ def lines(body: Body, indent: str) -> Iterator[Line]:
                 for atom, handler in rest[1]:
                     yield f"{indent}interrupt when {holds_text(atom)}:", None
                     yield from lines(handler, inner)
+            case "catch":
+                yield f"{indent}try:", said
+                yield from lines(rest[0], inner)
+                blocks = [(f"except{kind}", handler) for kind, handler in rest[1]]
+                for word_, block in [*blocks, ("else", rest[2]), ("finally", rest[3])]:
+                    if block:
+                        yield f"{indent}{word_}:", None
+                        yield from lines(block, inner)
             case "do" | "choose" | "shuffle":
                 done = "do" if word == "do" else f"do {word}"
                 yield f"{indent}{done} {', '.join(f'{name}()' for name in rest[0])}", said
@@ -260,13 +295,17 @@ class Running:
         self.world.doing[self.calls[0][1], self.world.now] = self.calls, said
 
     def check(self, *, first: bool = False) -> bool:
+        return not self.violated(first=first)
+
+    def violated(self, *, first: bool = False) -> str:
+        """The kind of the first guard that does not hold; "" where all do."""
         precondition, invariant, _ = self.world.program.behaviors[self.name]
-        guards = [*([precondition] if first else []), invariant]
-        return all(self.world.holds(each) for each in guards if each is not None)
+        guards = [("precondition", precondition)] * first + [("invariant", invariant)]
+        return next((kind for kind, each in guards if each is not None and not self.world.holds(each)), "")
 
     def invariant(self) -> None:
         if not self.check():
-            raise Rejection
+            raise Raised("invariant")
 
     def run(self) -> Iterator[None]:
         self.flag = False
@@ -277,8 +316,8 @@ class Running:
                 raise
 
     def started(self) -> Iterator[None]:
-        if not self.check(first=True):
-            raise Rejection
+        if kind := self.violated(first=True):
+            raise Raised(kind)
         yield from self.run()
 
     def block(self, body: Body) -> Iterator[None]:
@@ -302,7 +341,7 @@ class Running:
                     )
                 case "require":
                     if not self.world.holds(rest[0]):
-                        raise Rejection
+                        raise Raised("require")
                 case "terminate":
                     raise EndOfRun
                 case "if":
@@ -317,6 +356,8 @@ class Running:
                             raise
                 case "try":
                     yield from self.interrupted(rest[0], rest[1])
+                case "catch":
+                    yield from self.caught(*rest)
                 case "do":
                     yield from self.inner(said, rest[0][0]).started()
                     self.invariant()
@@ -330,7 +371,7 @@ class Running:
                     while left:
                         enabled = [each for each in left if self.inner(said, each).check(first=True)]
                         if not enabled:
-                            raise Rejection
+                            raise Raised("require")
                         chosen = enabled[self.world.choose(len(enabled))] if len(enabled) > 1 else enabled[0]
                         left.remove(chosen)
                         yield from self.inner(said, chosen).run()
@@ -341,6 +382,26 @@ class Running:
                     raise Leaves(word)
                 case _:
                     raise AssertionError(word)
+
+    def caught(
+        self, body: Body, handlers: list[tuple[str, Body]], orelse: Body, final: Body
+    ) -> Iterator[None]:  # fmt: skip
+        """A `try` with `except`, `else` and `finally`; a generator that is dropped does nothing more."""
+        try:
+            try:
+                yield from self.block(body)
+            except Raised as error:
+                kind = str(error)
+                handler = next((block for name, block in handlers if kind in CAUGHT[name]), None)
+                if handler is None:
+                    raise
+                yield from self.block(handler)
+            else:
+                yield from self.block(orelse)
+        except (Leaves, Raised):
+            yield from self.block(final)
+            raise
+        yield from self.block(final)
 
     def step(self) -> None:
         self.world.idle += 1

@@ -72,6 +72,9 @@ def recordings(trace: dict[str, Any], seed: int) -> Iterator[Recorded]:
         yield Recorded(f"aside-{number}", _aside(longer, number, 6.0), step)
         yield Recorded(f"turned-{number}", _turned(longer, number, len(states) // 2), step)
         yield Recorded(f"faster-{number}", _faster(longer, number, 1.8), step)
+    yield Recorded("back", _back(longer, len(states) // 2), step)
+    for number in range(1, min(MOST_CHANGED, len(states[0]))):
+        yield Recorded(f"swapped-{number}", _swapped(longer, number, len(states) // 2), step)
 
 
 def _jittered(states: States, seed: int) -> States:
@@ -121,6 +124,21 @@ def _turned(states: States, number: int, step: int) -> States:
 def _faster(states: States, number: int, factor: float) -> States:
     first = states[0][number]
     return _with(states, number, [first, *([*s[number][:3], *(factor * v for v in s[number][3:])] for s in states[1:])])
+
+
+def _back(states: States, step: int) -> States:
+    """Everything goes back the way it came from a step on, as it faced."""
+    gone = reversed(states[:step])
+    return states[: step + 1] + [[[x, y, h, -east, -north] for x, y, h, east, north in sample] for sample in gone]
+
+
+def _swapped(states: States, number: int, step: int) -> States:
+    """The object before another and that other trade places at a step."""
+    first, then = (
+        _with(states, at, [s[of] for s in states]) for at, of in ((number - 1, number), (number, number - 1))
+    )
+    both = _with(first, number, [sample[number] for sample in then])
+    return states[:step] + both[step:]
 
 
 def write(folder: Path, chart: Path, objects: list[dict[str, Any]], recorded: list[Recorded]) -> None:

@@ -4,9 +4,9 @@ Run by `make conformance-time MAP=Town01.xodr`, or with SCENIC=a checkout for th
 publishes, on the towns that they name or, where the checkout lacks one, on another. Scenic's Newtonian simulator runs
 each program (`simulate.py`). Its trace is written as a recording, ingested and matched with `--behaviors ignore`, or as
 `--behaviors` says: it must match from its first sample to its last. So must what is left of it at 2 Hz, and with noise
-within the tolerance; and changed ones (an object late, stopped, aside, turned, or said to be faster, the trace cut)
-must match if and only if Scenic, replaying the same states with or without behaviors, whose actions do nothing, says
-that the program holds, and must end where it says.
+within the tolerance; and changed ones (an object late, stopped, aside, turned, or said to be faster, two that trade
+places, the trace cut, or going back the way it came) must match if and only if Scenic, replaying the same states with
+or without behaviors, whose actions do nothing, says that the program holds, and must end where it says.
 """
 
 from __future__ import annotations
@@ -150,11 +150,11 @@ def judge(
         row.said.append(f"{each.name}: Scenic says {said} of {last}, scenicq {[one[:2] for one in spans]}")
 
 
-def compare(name: str, path: Path, original: Original, work: Path, seeds: int, behaviors: str) -> Row:
-    """Simulate a program and match its traces."""
+def compare(name: str, path: Path, original: Original, work: Path, seeds: range, behaviors: str) -> Row:
+    """Simulate a program and match its traces, one of each seed."""
     row = Row(name)
     text = path.read_text(encoding="utf-8")
-    for seed in range(seeds):
+    for seed in seeds:
         trace = original.simulate({"file": str(path.resolve())}, seed, SIMULATION_S, STEPS)
         if "error" in trace:
             row.said.append(f"Scenic says: {trace['error'][:300]}")
@@ -213,6 +213,7 @@ def parse_arguments() -> argparse.Namespace:
     parser.add_argument("--environment", type=Path, default=Path(".conformance-venv"), help="where Scenic is installed")
     parser.add_argument("--work", type=Path, default=Path(".conformance/traces"), help="folder of maps and recordings")
     parser.add_argument("--seeds", type=int, default=2, help="traces of each program")
+    parser.add_argument("--first-seed", type=int, default=0, help="the seed of the first of them")
     parser.add_argument(
         "--behaviors", choices=("ignore", "guards", "motion"), default="ignore", help="as of `scenicq match`"
     )
@@ -225,6 +226,7 @@ def main() -> int:
     """Simulate and match; 0 if both sides always agree."""
     arguments = parse_arguments()
     python = environment(arguments.environment, SCENIC, "verifai")
+    seeds = range(arguments.first_seed, arguments.first_seed + arguments.seeds)
     different = compare_formulas(python, arguments.formulas)
     print(f"rv_ltl: {arguments.formulas} formulas and traces, {different} differ", flush=True)
     rows: list[Row] = []
@@ -236,7 +238,7 @@ def main() -> int:
                 continue
             if chart not in originals:
                 originals[chart] = Original(python, chart, arguments.work / chart.stem, "simulate.py")
-            row = compare(name, path, originals[chart], arguments.work, arguments.seeds, arguments.behaviors)
+            row = compare(name, path, originals[chart], arguments.work, seeds, arguments.behaviors)
             rows.append(row)
             print(row.line(), *(f"    {line}" for line in row.said), sep="\n", flush=True)
     finally:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -12,6 +13,7 @@ from scenicq.forest.bounds import scalar_bounds
 from scenicq.forest.nodes import Constant, DirectionAt, Node, Range, Select
 from scenicq.forest.walk import postorder
 from scenicq.geometry.default_street import street
+from scenicq.geometry.network import Network
 
 MODEL = "model scenic.domains.driving.model\nego = new Car\n"
 
@@ -21,13 +23,42 @@ def heading_of_the_last(text: str) -> Node:
     return scenario.objects[-1].properties["heading"].value
 
 
-@pytest.mark.parametrize("place", ["sidewalk", "crossing", "Uniform(*network.sidewalks)", "visible sidewalk"])
+@pytest.mark.parametrize(
+    "place",
+    [
+        "sidewalk",
+        "crossing",
+        "Uniform(*network.sidewalks)",
+        "visible sidewalk",
+        "Uniform(*network.roads).sidewalkRegion",
+        "network.roads[0].sidewalkRegion",
+    ],
+)
 def test_where_the_map_gives_no_direction_it_is_any(place: str) -> None:
     heading = heading_of_the_last(
         f"spot = new OrientedPoint on {place}\nnew Object at spot, facing 0 relative to spot\n"
     )
-    assert [type(node) for node in postorder([heading]) if isinstance(node, Range | DirectionAt)] == [Range]
+    assert {type(node) for node in postorder([heading]) if isinstance(node, Range | DirectionAt)} == {Range}
     assert scalar_bounds(heading) == pytest.approx((-math.pi, math.pi))
+
+
+@pytest.mark.parametrize("place", ["sidewalk", "network.roads[0].sidewalkRegion", "network.sidewalks[0]"])
+def test_what_is_said_of_the_road_is_not_asked_where_the_map_gives_another_direction(place: str) -> None:
+    features = [
+        replace(each, properties={**each.properties, "centerline": [[[9.0, -40.0], [9.0, 40.0]]]})
+        if each.kind == "sidewalk"
+        else each
+        for each in street().features
+    ]
+    text = f"{MODEL}new Car in {place}, with roadDeviation 90 deg\n"
+    scenario = compile_scenario(Source("test.scenic", text), Network("walks", features))
+    heading = scenario.objects[-1].properties["heading"].value
+    fields = [node.field for node in postorder([heading]) if isinstance(node, DirectionAt)]
+    assert fields
+    assert all(isinstance(field, Constant) and field.value.name != street().roadDirection.name for field in fields)
+    assert not any(
+        isinstance(node, Constant) and node.value == pytest.approx(math.pi / 2) for node in postorder([heading])
+    )
 
 
 def test_on_the_road_it_is_that_of_traffic() -> None:

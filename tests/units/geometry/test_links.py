@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import pytest
 
 from scenicq.geometry.default_street import street
 from scenicq.geometry.features import MapFeature, read_geojson
-from scenicq.geometry.links import DIRECTS, IS_SECTION, LINKS, find_link, links_of
+from scenicq.geometry.lanes_ahead import lanes_from
+from scenicq.geometry.links import AHEAD, AHEAD_M, DIRECTS, IS_SECTION, LINKS, LISTS, find_link, links_of
 from scenicq.geometry.network import Network
 
 SAMPLES = Path(__file__).parents[3] / "sample_data"
@@ -19,6 +21,7 @@ KINDS = {
     "road": "allRoads",
     "sidewalk": "sidewalks",
     "shoulder": "shoulders",
+    "intersection": "intersections",
 }
 
 
@@ -44,15 +47,40 @@ def test_links_are_what_the_network_says(name: str):
     expected = set()
     for kind, listed in KINDS.items():
         for element in getattr(network, listed):
-            for link, target in LINKS[kind].items():
+            for link, target in LISTS.get(kind, {}).items():
+                for there in getattr(element, link):
+                    expected.add((kind, _area(network, element), link, _area(network, there)))
+                    assert there in getattr(network, KINDS[target])
+            for link, target in LINKS.get(kind, {}).items():
                 there = getattr(element, f"_{link}" if hasattr(element, f"_{link}") else link)
                 if there is not None:
                     expected.add((kind, _area(network, element), link, _area(network, there)))
-                    assert there in getattr(network, {**KINDS, "intersection": "intersections"}[target])
+                    assert there in getattr(network, KINDS[target])
             if kind == "lane_section":
                 expected.add((kind, _area(network, element), IS_SECTION, _area(network, element)))
-    assert {tuple(each) for each in found if each.link != DIRECTS} == expected
+    assert {each[:4] for each in found if each.link not in (DIRECTS, AHEAD)} == expected
+    assert all((each.begins is not None) is (each.link == AHEAD) for each in found)
     assert len(found) == len(list(links_of(network.features)))
+
+
+@pytest.mark.parametrize("name", MAPS)
+@pytest.mark.parametrize("distance", [0.0, 3.0, 20.0, AHEAD_M])
+def test_lanes_ahead_begin_where_those_on_the_way_end(name: str, distance: float):
+    """A depth-first walk along all ways, however long, says what the shortest way is."""
+    network = Network(name, MAPS[name])
+    found = {(each.region, each.target): each.begins for each in links_of(network.features) if each.link == AHEAD}
+    for lane in network.lanes:
+        ahead: dict[str, float] = {lane.id: 0.0}
+        todo = [(each, 0.0) for each in lane.successors]
+        while todo:
+            each, begins = todo.pop()
+            if begins <= distance and begins < ahead.get(each.id, math.inf):
+                ahead[each.id] = begins
+                end = begins + sum(line.length for line in each.centerline.lines)
+                todo += [(after, end) for after in each.successors]
+        mine = {target: begins for (region, target), begins in found.items() if region == lane.id}
+        assert {target: begins for target, begins in mine.items() if begins <= distance} == pytest.approx(ahead)
+        assert {each.id for each in lanes_from(lane, distance)} == ahead.keys()
 
 
 @pytest.mark.parametrize("name", MAPS)

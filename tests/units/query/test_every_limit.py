@@ -357,7 +357,7 @@ class Clocks:
 def test_the_time_may_be_used_up_at_any_moment(compared, name, rounds):
     counting = Clocks(math.inf)
     compared.compare(name, lambda patch: patch.setattr(budget, "time", counting))
-    moments = random.Random(name).sample(range(1, counting.seen + 1), min(rounds(48), counting.seen))
+    moments = random.Random(name).sample(range(1, counting.seen + 1), min(rounds(24), counting.seen))
     for moment in sorted({*moments, counting.seen}):
         compared.compare(name, lambda patch, moment=moment: patch.setattr(budget, "time", Clocks(moment)))
 

@@ -37,7 +37,7 @@ SOURCES |= {name: REAL / name for name in ("boston", "nuscenes-mini", "argoverse
 MAPS = {"nuscenes-mini": [REAL / "boston" / "maps" / "boston-seaport.geojson"]}
 RANDOM, PARTS = 80, 8
 """Random programs, and parts in which all programs are tried on a dataset."""
-FRAMES, SECONDS, MOST_STOPPED = 48, 4.0, 0.1
+FRAMES, SECONDS, MOST_STOPPED = 24, 2.5, 0.1
 """Frames of a dataset of each kind and processor time for a program, and the share of programs that may take longer."""
 CROWDED = {"nuscenes-mini": 8, "argoverse2": 8}
 """Fewer frames of those that have dozens of objects: with any of them as the ego, a frame takes up to a second."""

@@ -23,7 +23,7 @@ def tables(folder: Path) -> dict[str, bytes]:
     return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*.parquet"))}
 
 
-@pytest.mark.parametrize("name", ["tiny", "tiny5", "tiny6", "tiny7"])
+@pytest.mark.parametrize("name", ["tiny", "tiny5", "tiny6", "tiny7", "tiny8"])
 def test_a_dataset_is_refused_with_what_brings_it_up_and_what_it_says_is_kept(run, tmp_path, name):
     with pytest.raises(DataError, match="`scenicq index"):
         open_dataset(OLDER / name, check=True)
@@ -40,7 +40,7 @@ def test_a_dataset_is_refused_with_what_brings_it_up_and_what_it_says_is_kept(ru
     assert len(list(dataset.labels())) == said["total"]["frames"] == 6
 
 
-@pytest.mark.parametrize("name", ["tiny", "tiny5", "tiny6", "tiny7"])
+@pytest.mark.parametrize("name", ["tiny", "tiny5", "tiny6", "tiny7", "tiny8"])
 def test_index_makes_of_it_what_an_ingest_makes(run, tmp_path, name):
     shutil.copytree(OLDER / name, tmp_path / "d")
     assert run("index", tmp_path / "d").exit_code == 0
