@@ -27,6 +27,7 @@ NO_LIMITS = {
     "match/decide/decomposition.py": "_FEW_OPTIONS: which of two ways comes first",
     "match/fields/witness_search.py": "_FEW: draws of a search that has nowhere to go",
     "query/execution/result_files.py": "_LONGEST: what a cell of a file may be",
+    "query/execution/sql_deadline.py": "_LONGEST_WAIT_S: how long a thread waits at a time",
     "query/explain/changes.py": "MOST_M: how far `--near` looks",
     "query/explain/tolerance_share.py": "_LONGEST_S: the time of a frame that nobody asked for",
     "query/explain/violations.py": "_LONGEST_NAME: a name that is shown",

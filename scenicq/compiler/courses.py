@@ -1,8 +1,8 @@
-"""Conditions whose course depends on the scene: `if`, filters, `sorted` and their like in `require`, monitors and ends.
+"""Conditions that branch on random values, as one expression: `if`, filters, `sorted` in `require`, monitors, ends.
 
-Scenic evaluates such a condition on the drawn scene, on which everything is known. Here a label takes the scene's place
-later on. So the condition is evaluated once for each course that it may take, and becomes a choice between their
-values. What one course lacks excludes the scenes that take it.
+Scenic evaluates such a condition on a drawn scene, where every value is known. Here it is compiled before any label is
+known. So it is evaluated once for each path through the branches, its *course* (symbolic execution), and the values are
+joined to a choice. Where something is missing on a path, such as a lane, the scenes that take the path are excluded.
 """
 
 from __future__ import annotations
@@ -29,29 +29,29 @@ __all__ = ["Course", "as_test", "forbid_courses", "option_of", "split_by_course"
 
 
 class Course:
-    """What decides the tests of a condition that is evaluated; where this stands by itself, there must be none."""
+    """Decides each random test while a condition is evaluated. This base class refuses every test."""
 
     __slots__ = ()
 
     def decide(self, test: Node, span: Span) -> bool:
-        """What a random test comes out as.
+        """The outcome of a random test on this path.
 
         Raises:
-            ScenarioError: random-branch, where the condition may take one course alone.
+            ScenarioError: random-branch: branches are forbidden here, or the paths draw different random variables.
         """
         raise _refused(span, "a loop must run a known number of times")
 
 
 @dataclass(eq=False, slots=True)
 class _Taken(Course):
-    """One course.
+    """One path.
 
     Attributes:
-        given: What its first tests come out as; those after them come out as true.
-        tests: Its tests.
-        outcomes: What they came out as.
-        excluded: Told under which outcomes something is lacking.
-        around: Takes back what `excluded` was told.
+        given: The first tests with their outcomes; each later test comes out true.
+        tests: The tests so far, in order.
+        outcomes: Their outcomes.
+        excluded: The exclusions. They assume the outcomes so far, so that what is missing is excluded here only.
+        around: Ends these assumptions.
     """
 
     given: tuple[tuple[Node, bool], ...]
@@ -61,7 +61,7 @@ class _Taken(Course):
     outcomes: list[bool] = field(default_factory=list[bool])
 
     def decide(self, test: Node, span: Span) -> bool:
-        """What the course says, else that the test holds."""
+        """The given outcome of the next test; true after the last given one."""
         number, outcome = len(self.tests), True
         if number < len(self.given):
             before, outcome = self.given[number]
@@ -89,12 +89,12 @@ def _on(run: Interpreter, course: Course) -> Generator[None]:
 
 
 def forbid_courses(run: Interpreter) -> AbstractContextManager[None]:
-    """While what is evaluated must have one course, although objects are read as a label shows them."""
+    """A block in which a random test is an error; objects are still read as a label shows them."""
     return _on(run, Course())
 
 
 def split_by_course(run: Interpreter, evaluate: Callable[[], Node], span: Span) -> Node:
-    """The value of a condition as a choice between those of its courses.
+    """Evaluate a condition on every path, and join the values to one expression.
 
     Args:
         run: The interpreter.
@@ -149,7 +149,7 @@ def _exclude(excluded: Exclusions, course: _Taken, span: Span) -> None:
 
 
 def _either(test: Node, no: Node, yes: Node, span: Span) -> Node:
-    """`yes if test else no`, as a connective where one of them is known."""
+    """`yes if test else no`; a constant branch makes it `and`, `or` or `not`."""
     opposite = build.opposite(test)
     match no, yes:
         case Constant(value=bool(without)), Constant(value=bool(with_)):
@@ -167,7 +167,7 @@ def _either(test: Node, no: Node, yes: Node, span: Span) -> Node:
 
 
 def option_of(run: Interpreter, value: ModelValue, span: Span) -> ModelValue:
-    """The option of a random choice that the course takes, found by halving; anything else as it is.
+    """The option that a random choice takes on this path, found by bisection. Other values are returned unchanged.
 
     Raises:
         ScenarioError: random-branch, where only one course may be taken.
@@ -182,14 +182,14 @@ def option_of(run: Interpreter, value: ModelValue, span: Span) -> ModelValue:
 
 
 def _comes_before(choice: Choice, number: int) -> Node:
-    """Whether a choice comes out as one of its first options."""
+    """The test that a choice takes one of its first `number` options."""
     if isinstance(choice.index, Index):
         return Select(choice.index, tuple(build.constant(each < number) for each in range(len(choice.options))))
     return build.compare(CompareOp.LT, choice.index, build.constant(float(number)))
 
 
 def as_test(value: ModelValue, span: Span) -> ModelValue:
-    """The truth of a value, as an expression where it is random; the value itself where that has no such truth."""
+    """Make a random value a truth value. A value that is not random, or has no such truth, is returned unchanged."""
     if isinstance(value, Choice):
         options = [as_test(option, span) for option in value.options]
         if any(is_node(option) and kind_of_model(option) != "boolean" for option in options):

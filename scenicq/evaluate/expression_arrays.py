@@ -21,7 +21,7 @@ from scenicq.forest.nodes import DirectionAt, Feature, Identity, Leaf, Node
 __all__ = ["evaluate_arrays", "points_of"]
 
 _MOST_POINTS = 300_000
-"""Points at which a map is asked at most."""
+"""The map is asked at no more points than this."""
 
 
 def evaluate_arrays(
@@ -41,7 +41,7 @@ def evaluate_arrays(
         draws: How many there are.
 
     Raises:
-        CannotEvaluate: An expression has a part that cannot be computed so.
+        CannotEvaluate: A feature has no value, geometry cannot decide, or a region has no value for some labels.
     """
     drawn: dict[Identity, Column] = {}
     fields = count()

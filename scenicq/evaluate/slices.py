@@ -23,11 +23,11 @@ Numbers = NDArray[np.int64]
 _Pair = Sequence[Any]
 
 _PARTS = 5
-"""Into how many parts of like size numbers are cut."""
+"""Numbers are cut into so many parts, each with about as many frames."""
 _LONGEST = 40
 """Characters of source text that are shown."""
 _NAMES = 12
-"""More distinct texts than this are no slices."""
+"""A parameter with more distinct texts than this makes no slices."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +50,7 @@ class Slice:
 
     @property
     def title(self) -> str:
-        """What divides them, for people: the source text of a random variable, with line and column."""
+        """`by` for people: a random variable is shown as its source text with line and column."""
         place = _place(self.by)
         coordinate = self.by.removeprefix(place).strip()
         if not self.source:
@@ -97,7 +97,7 @@ def _parts_of(detection: Detection, matched: FrameSplit, mine: Bools) -> Iterato
     ) -> Iterator[tuple[str, str, Bools, bool]]:
         """Make slices by the number of each object's part, -1 for none."""
         there = [number for number in range(len(names)) if (mine & (part == number)).any()]
-        # what differs between any two recordings, as their names do, is no slice
+        # a division that only tells recordings apart, as their names do, says nothing
         shared = any(len(np.unique(recording[mine & (part == number)])) > 1 for number in there)
         if len(there) > 1 and shared:
             for number in there:

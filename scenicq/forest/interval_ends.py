@@ -1,4 +1,7 @@
-"""The arithmetic of an interval's ends: floats, or NumPy arrays that broadcast with one another and with floats."""
+"""The arithmetic of an interval's ends: the protocol `Ends`, and its versions for floats and for NumPy arrays.
+
+Arrays broadcast with one another and with floats. `query/prefilter/sql_ends` has the version for SQL.
+"""
 
 from __future__ import annotations
 
@@ -17,18 +20,18 @@ E = TypeVar("E")
 
 
 class Ends(Protocol[E]):
-    """What can be done with ends; truth values are of the kind that `at_most` gives."""
+    """The operations that interval arithmetic needs of ends; conditions have the type that `at_most` returns."""
 
     def number(self, value: float) -> E:
         """An end that is a plain number."""
         ...
 
     def between(self, low: E, high: E) -> Interval[E]:
-        """The interval between two ends; exact where they show to be one number."""
+        """The interval between two ends. It is exact if both are known to be one finite number; arrays never are."""
         ...
 
     def known(self, value: E) -> Interval[E]:
-        """The interval of one number; everything where it is none."""
+        """The interval of one number; all numbers where it is infinite or nan."""
         ...
 
     def plus(self, a: E, b: E) -> E:
@@ -40,11 +43,11 @@ class Ends(Protocol[E]):
         ...
 
     def times(self, a: E, b: E) -> E:
-        """The product; nothing times an infinite end is nothing."""
+        """The product; zero times an infinite end is zero."""
         ...
 
     def divided(self, a: E, b: E) -> E:
-        """The quotient; nothing where the divisor is infinite, no number where it is zero."""
+        """The quotient. It is zero where the divisor is infinite, and not finite where the divisor is zero."""
         ...
 
     def least(self, parts: Sequence[E]) -> E:
@@ -60,7 +63,7 @@ class Ends(Protocol[E]):
         ...
 
     def root(self, a: E) -> E:
-        """The square root; no number of what is negative."""
+        """The square root; nan for negative numbers."""
         ...
 
     def sine(self, a: E) -> E:
@@ -76,7 +79,7 @@ class Ends(Protocol[E]):
         ...
 
     def heading(self, x: E, y: E) -> E:
-        """The heading of a vector in radians, in [-pi, pi]."""
+        """The heading of a vector in radians, in [-pi, pi), counter-clockwise from the y axis."""
         ...
 
     def turned(self, a: E) -> E:
@@ -172,7 +175,7 @@ class _Floats:
 
 
 class _Arrays:
-    """Ends that are arrays or floats; what is no number is dealt with by the caller's `np.errstate`."""
+    """Ends that are arrays or floats. The caller silences warnings about nan by `np.errstate`."""
 
     def number(self, value: float) -> FloatOrArray:
         return value

@@ -1,8 +1,9 @@
-"""The domain of intervals: outer bounds of values, never too narrow, over ends of any kind (`interval_ends`).
+"""The abstract domain of intervals: bounds that hold every value, with ends of any kind (`interval_ends`).
 
-A scalar is an interval, a vector or a region a box, a truth value whether it can hold and whether it can fail; anything
-else (a text, a vector field) is None. With ends that are columns, an expression over what many labels or samples
-observe has exact intervals: their ends are its values, and where nothing is observed they are infinite.
+A scalar has an interval, a vector or region has a box. A condition has a `Truth`: whether it can hold and whether it
+can fail. Anything else (a text, a vector field) has None. Ends may be columns over many labels or samples. Then an
+expression over observed values has exact intervals, whose ends are its values; where nothing is observed they are
+infinite.
 """
 
 from __future__ import annotations
@@ -67,7 +68,7 @@ class IntervalDomain(IntervalArithmetic[E]):
     Attributes:
         observed: What is known of a feature; None where it is not observed.
         points: Tighter boxes for some random points: (west, east), (south, north) in metres.
-        boxed: Whether the boxes of regions say something of what is asked of regions.
+        boxed: Whether the boxes of regions bound distances and membership; if not, either may come out as anything.
     """
 
     observed: Callable[[Feature], IntervalValue[E]] = _unobserved
@@ -158,7 +159,7 @@ class IntervalDomain(IntervalArithmetic[E]):
         return IntervalVector(self.multiply(a.x, by), self.multiply(a.y, by))
 
     def rotate(self, vector: IntervalValue[E], angle: IntervalValue[E]) -> IntervalVector[E]:
-        """A box around what a vector turns to."""
+        """A box around a vector that is turned by an angle in radians."""
         (x, y), by = self._pair(vector), self._scalar(angle)
         ends = self.ends
         if not by.exact:
@@ -224,7 +225,7 @@ class IntervalDomain(IntervalArithmetic[E]):
         return Truth(hold, fail)
 
     def select(self, index: IntervalValue[E], options: Sequence[IntervalValue[E]]) -> IntervalValue[E]:
-        """What holds all options."""
+        """The smallest interval or box around all options; open for truth values, None for mixed or other kinds."""
         if any(isinstance(option, Truth) for option in options):
             return _OPEN
         scalars = [option for option in options if isinstance(option, Interval)]
@@ -250,7 +251,7 @@ class IntervalDomain(IntervalArithmetic[E]):
     # --- the map
 
     def on_map(self, node: OnMap, args: Sequence[IntervalValue[E]]) -> IntervalValue[E]:
-        """Points are in a region only where they are in its box, and no closer to it than to its box."""
+        """What the boxes say: a point in a region is in its box, and no point is nearer to a region than to its box."""
         match node:
             case DirectionAt():
                 return self.within(-math.pi, math.pi)

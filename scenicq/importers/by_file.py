@@ -13,7 +13,7 @@ from scenicq.errors import DataError, Diagnostic
 from scenicq.geometry.features import MapFeature, ProblemSink
 from scenicq.importers.base import ClassNames, LabelChecker, OpenedSource, RecordingEntry
 from scenicq.importers.folders import readable
-from scenicq.importers.recording_checks import tell_order
+from scenicq.importers.recording_checks import check_order
 from scenicq.importers.report import Report
 from scenicq.store.columns import RecordingColumns
 from scenicq.store.labels import Label
@@ -70,7 +70,7 @@ class FileReader:
                 for diagnostic in error.diagnostics:
                     report.leave_out("recording", diagnostic.code, diagnostic.message, hints=diagnostic.hints)
                 continue
-            tell_order(place.name, [label.timestamp_us for label, _ in made], report, numbered=True)
+            check_order(place.name, [label.timestamp_us for label, _ in made], report, numbered=True)
             if (recording := labels.check_labels(place.name, made)) is not None:
                 yield recording
 

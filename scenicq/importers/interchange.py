@@ -35,7 +35,7 @@ from scenicq.importers.folders import first_files, read_bytes, readable
 from scenicq.importers.grouped_lines import GroupedLines, group_lines
 from scenicq.importers.interchange_labels import LabelLines
 from scenicq.importers.layouts import is_interchange
-from scenicq.importers.recording_checks import tell_order
+from scenicq.importers.recording_checks import check_order
 from scenicq.importers.report import Report
 from scenicq.importers.specification import load_specification
 from scenicq.store.classes import taxonomy, taxonomy_names
@@ -115,7 +115,7 @@ class LineReader:
             for text, place in self.lines.read(name):
                 read.add(text, place)
             for _, pairs in groupby(zip(read.places, read.times_us, strict=True), _file):
-                tell_order(name, [time for _, time in pairs], report, numbered=False)
+                check_order(name, [time for _, time in pairs], report, numbered=False)
             if (found := labels.check_columns(read.columns(), read.places, read.maps)) is not None:
                 yield found
 

@@ -19,7 +19,7 @@ __all__ = ["ElementBlock", "read_list"]
 _CHUNK = 1 << 20
 _LONGEST = 1 << 23
 _TAIL = 1 << 16
-"""How far from the end of a chunk the end of an element is looked for."""
+"""Characters at the end of a chunk in which the end of the last whole element is sought."""
 
 _GAP = re.compile(r"[\s,]*")
 _BETWEEN = re.compile(r"\}\s{0,99},\s{0,99}\{")

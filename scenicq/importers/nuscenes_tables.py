@@ -23,7 +23,7 @@ from scenicq.importers.fields import InvalidError, whole
 from scenicq.importers.json_tables import ElementBlock, read_list
 from scenicq.importers.nuscenes_boxes import Boxes, BoxReader, headings, join_boxes, norms_of, vectors
 from scenicq.importers.nuscenes_scenes import POSE_CHANNEL, Instant, SceneContent
-from scenicq.importers.recording_checks import tell_order
+from scenicq.importers.recording_checks import check_order
 from scenicq.importers.report import Report
 from scenicq.importers.typed_rows import ABSENT, RowError, RowType
 
@@ -249,7 +249,7 @@ class Tables:
         self._first_box: dict[str, int] = {}
         ranked = first = 0
         for scene in self.scenes:
-            tell_order(
+            check_order(
                 self.scenes[scene].name,
                 [sample.time for sample in self.samples_of[scene]],
                 self._report,

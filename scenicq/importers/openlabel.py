@@ -20,9 +20,9 @@ from scenicq.importers.by_file import RecordingFiles, by_file_source, missing
 from scenicq.importers.ego_choice import Moment, ego_facts, with_egos
 from scenicq.importers.fields import NO_MAP, InvalidError, Record
 from scenicq.importers.layouts import openlabel_files
-from scenicq.importers.openlabel_objects import FrameObjects, objects_of
+from scenicq.importers.openlabel_objects import FrameContext, objects_of
 from scenicq.importers.openlabel_systems import CoordinateSystems, first_vehicle
-from scenicq.importers.recording_checks import tell_order
+from scenicq.importers.recording_checks import check_order
 from scenicq.importers.report import Report
 from scenicq.importers.specification import load_specification
 from scenicq.importers.timestamps import microseconds
@@ -170,7 +170,7 @@ def _read_frames(content: Record, file: str, prefix: str, classes: ClassNames, r
             properties = fields.optional_record(frame, "frame_properties")
             at_frame = CoordinateSystems(systems, fields.optional_record(properties, "transforms"))
             report.count_unread("frames/*/frame_properties/transforms/* of no coordinate system", len(at_frame.unknown))
-            boxes = FrameObjects(at_frame, classes, report, where)
+            boxes = FrameContext(at_frame, classes, report, where)
             members = objects_of(content, frame, int(key), boxes)
             time = _time(properties)
             ego = next((each for each in members if each.id == "ego"), None)
@@ -201,7 +201,7 @@ def _timed(frames: Sequence[_Frame], by_file: bool, file: str, report: Report) -
             report.leave_out("label", "record-invalid", f"{frame.where}: it has no time, as others have")
         else:
             timed.append((frame, frame.time))
-    tell_order(file, [time for _, time in timed], report, numbered=True)
+    check_order(file, [time for _, time in timed], report, numbered=True)
     return sorted(timed, key=lambda each: each[1])
 
 

@@ -16,7 +16,7 @@ from scenicq.importers.recording_checks import radians
 from scenicq.importers.report import Report
 from scenicq.store.labels import LabelObject, OutOfPlane
 
-__all__ = ["FrameObjects", "objects_of"]
+__all__ = ["FrameContext", "objects_of"]
 
 _EGO = frozenset({"ego", "egocar", "egovehicle", "egoobject", "host", "hostvehicle"})
 _NO_OBJECT = "dontcare"
@@ -24,7 +24,7 @@ _SCALARS = ("boolean", "num", "text")
 
 
 @dataclass(frozen=True, slots=True)
-class FrameObjects:
+class FrameContext:
     """What the boxes of a frame need to become objects.
 
     Attributes:
@@ -40,7 +40,7 @@ class FrameObjects:
     where: str
 
 
-def objects_of(content: Record, frame: Record, number: int, boxes: FrameObjects) -> list[LabelObject]:
+def objects_of(content: Record, frame: Record, number: int, boxes: FrameContext) -> list[LabelObject]:
     """The objects with a box, the ego among them as `ego`.
 
     Args:
@@ -74,7 +74,7 @@ def objects_of(content: Record, frame: Record, number: int, boxes: FrameObjects)
 
 
 def _lives(whole: Record, number: int) -> bool:
-    """Whether an object that a frame does not name is there: it has intervals with the frame, or none at all."""
+    """Whether an object is in a frame that does not list it: its intervals hold the frame, or it has no intervals."""
     intervals = fields.optional_items(whole, "frame_intervals")
     return not intervals or any(
         fields.integer(each, "frame_start") <= number <= fields.integer(each, "frame_end")
@@ -82,8 +82,8 @@ def _lives(whole: Record, number: int) -> bool:
     )
 
 
-def _object(name: str, whole: Record, own: Record, boxes: FrameObjects) -> LabelObject | None:
-    """An object; None for what has no box and so no place, and for what stands for no object."""
+def _object(name: str, whole: Record, own: Record, boxes: FrameContext) -> LabelObject | None:
+    """An object; None without a cuboid, which gives its place, and for the type DontCare."""
     static = fields.optional_record(whole, "object_data")
     # Some writers say in each frame what the object is.
     kind = next((text for each in (whole, own, static) if (text := fields.optional_text(each, "type"))), "unknown")
@@ -116,13 +116,13 @@ def _plain(text: str) -> str:
 
 
 def _elements(data: Record, key: str) -> list[Record]:
-    """The elements of a kind: a list, of which some writers leave out the brackets."""
+    """The elements under a key. Some writers give a single element without a list."""
     if isinstance(data.get(key), dict):
         return [fields.record(data[key], f"`{key}`")]
     return [fields.record(each, f"`{key}`") for each in fields.optional_items(data, key)]
 
 
-def _attributes(data: Record, boxes: FrameObjects) -> Iterator[tuple[str, str | float | bool]]:
+def _attributes(data: Record, boxes: FrameContext) -> Iterator[tuple[str, str | float | bool]]:
     for kind in _SCALARS:
         for each in _elements(data, kind):
             value: Any = each.get("val")

@@ -1,4 +1,7 @@
-"""What no recording of sound units and one clock has: told and counted, taken as it is, no problem of its source."""
+"""Checks for signs of wrong units, or of a clock that was set back.
+
+A sign is reported and counted as an assumption; the values stay as they are, and `--strict` does not fail.
+"""
 
 from __future__ import annotations
 
@@ -13,26 +16,29 @@ from scenicq.importers.report import Report
 from scenicq.store.columns import RecordingColumns
 from scenicq.store.motion import track_numbers
 
-__all__ = ["radians", "tell_order", "tell_recording"]
+__all__ = ["check_order", "check_recording", "radians"]
 
 _FEWEST_TIMES, _SHORTEST_STEP_US, _LONGEST_STEP_US = 3, 1e3, 1e8
-"""Labels more often than a thousand times a second, or less often than every 100 s, have times in another unit."""
+"""At least three labels, and the mean step between them in microseconds. Others suggest another unit."""
 
 _LARGEST_ANGLE = 4 * math.pi
 """Radians: some sources count turns on, but hardly more than two."""
 
 _NO_ANGLE = 1e9
-"""From here on a number is no angle in any unit; that is for the reader of the field to tell."""
+"""A number this large is no angle in any unit. The reader of the field reports it."""
 
 _SHORTEST_JUMP_M, _FASTEST_M_S = 5.0, 100.0
-"""Metres beyond which a step is no inaccuracy of labels, and a speed that nothing on a road has."""
+"""A step jumps if it is longer than so many metres (labels are not so inexact) and faster than so many m/s."""
 
 _FEWEST_STEPS, _MOST_STEPS_BACK = 9, 0.1
-"""Where nothing numbers labels, with fewer steps, or a larger share of them back, they may be in no order at all."""
+"""Labels without numbers are checked only if there are so many steps, and at most this share goes back.
+
+Otherwise they may be in no order at all.
+"""
 
 
 def radians(angle: float, report: Report) -> float:
-    """An angle as it is; one that is no angle in radians is told.
+    """Return an angle unchanged, and report it if it is too large for radians.
 
     Args:
         angle: As a source has it.
@@ -44,14 +50,14 @@ def radians(angle: float, report: Report) -> float:
     return angle
 
 
-def tell_order(name: str, times_us: Sequence[int], report: Report, *, numbered: bool) -> None:
-    """Tell a clock that was set back.
+def check_order(name: str, times_us: Sequence[int], report: Report, *, numbered: bool) -> None:
+    """Report that the times of a recording go back.
 
     Args:
         name: The name of the recording.
         times_us: The times of its labels, as the source orders them.
         report: Takes what is told.
-        numbered: Whether the source numbers its labels, so that their order is no accident.
+        numbered: Whether the source numbers its labels, which proves that their order is meant.
     """
     steps = [after - before for before, after in pairwise(times_us)]
     back = sum(step < 0 for step in steps)
@@ -64,8 +70,8 @@ def tell_order(name: str, times_us: Sequence[int], report: Report, *, numbered: 
         report.assume("recording", f"order of times in {name}", message)
 
 
-def tell_recording(columns: RecordingColumns, report: Report) -> None:
-    """Tell a rate that no recorder has, and tracks whose class changes or that jump.
+def check_recording(columns: RecordingColumns, report: Report) -> None:
+    """Report an implausible rate of labels, tracks that change their class, and tracks that jump.
 
     Args:
         columns: The columns of the recording.
@@ -89,11 +95,11 @@ def tell_recording(columns: RecordingColumns, report: Report) -> None:
             listed = " and ".join(f"`{kind}` in {count} frames" for kind, count in sorted(found))
             message = f"track `{track}` of recording `{columns.name}` is {listed}"
             report.assume("track", "tracks that change their class", message)
-    _tell_jumps(columns, report)
+    _check_jumps(columns, report)
 
 
-def _tell_jumps(columns: RecordingColumns, report: Report) -> None:
-    """Tell tracks that are twice somewhere nothing gets from one place to the other in time."""
+def _check_jumps(columns: RecordingColumns, report: Report) -> None:
+    """Report tracks that move over 5 m at over 100 m/s between two labels, each at its first such step."""
     objects = columns.objects
     track = track_numbers(objects.track)
     time_us = np.repeat(np.array(columns.times_us, dtype=np.int64), columns.object_counts)

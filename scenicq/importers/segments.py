@@ -22,7 +22,7 @@ from msgspec import structs
 from scenicq.errors import DataError, Diagnostic
 from scenicq.garbage import pause_collector
 from scenicq.importers.base import LabelChecker, RecordingEntry, RecordingReader
-from scenicq.importers.recording_checks import tell_recording
+from scenicq.importers.recording_checks import check_recording
 from scenicq.importers.report import MOST_MESSAGES, Report
 from scenicq.processes import LostTask, Workers, default_processes
 from scenicq.store.schema import SCHEMA_VERSION, SEGMENT_TABLES, ArrowTable
@@ -243,7 +243,7 @@ def _read(
     report = Report(strict=world.strict)
     maps: dict[str, str] = {}
     for found in share.reader.recordings(LabelChecker(world.maps.keys(), report, job.taken), report):
-        tell_recording(found, report)
+        check_recording(found, report)
         writer.add(found, indexes.of(found.map))
         on_recording(found.name, len(found.frames))
         maps[found.map] = world.digests.get(found.map, "")

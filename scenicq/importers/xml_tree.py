@@ -1,4 +1,4 @@
-"""XML that nobody has checked: read in bounded memory, entities refused, so that no text grows when it is read."""
+"""A reader of untrusted XML: it bounds size and depth, and refuses entities, which could grow when they are read."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def number(element: Element, *names: str) -> float:
     """The finite number at a path of names.
 
     Raises:
-        InvalidError: It is not there, or is none.
+        InvalidError: The element is missing, or its text is no number below 1e9 in size.
     """
     found = child(element, *names)
     try:

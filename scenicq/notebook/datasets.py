@@ -113,13 +113,13 @@ def _with_model(options: OptionTexts) -> OptionTexts:
 
 
 _SOUND = SoundNotes()
-"""What this process has found out."""
+"""The datasets that this process has found sound."""
 
 
 def open(address: str | Path, *, notes: str | Path | None = None) -> OpenedDataset:
     """Open a dataset that `scenicq ingest` made.
 
-    It is read whole to see whether it is sound: once in a process, and again where a file has changed.
+    The whole dataset is read to check that it is sound: once in a process, and again after a file has changed.
 
     Args:
         address: A folder, or what fsspec understands, such as `s3://bucket/dataset`.
@@ -127,7 +127,7 @@ def open(address: str | Path, *, notes: str | Path | None = None) -> OpenedDatas
             `sound` in its state folder, such as `~/.local/state/scenicq/sound`.
 
     Raises:
-        DataError: store-missing, store-version or store-damaged; dataset-invalid.
+        DataError: store-missing, store-version, store-damaged, dataset-invalid or option-invalid.
     """
     if not isinstance(address, str | Path):  # pyright: ignore[reportUnnecessaryIsInstance]
         message = f"the address of a dataset is a text or a path, not {type(address).__name__}"

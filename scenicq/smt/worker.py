@@ -29,8 +29,9 @@ from scenicq.smt.problem import Problem
 __all__ = ["Check", "Request", "Setup", "read_answer", "seconds_of", "serve", "write_answer"]
 
 Check = Callable[..., Answer]
-_TOOK = "took_s"
 """A function like `Solver.check`."""
+_TOOK = "took_s"
+"""The key of an answer's processor seconds."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +70,7 @@ def serve(setup: Setup, requests: IO[bytes], descriptor: int) -> None:
     Args:
         setup: What to run.
         requests: The stream that the setup came from.
-        descriptor: Where answers go. Those of standard output and standard error go nowhere.
+        descriptor: The file descriptor for answers. Standard output and standard error lead nowhere.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     answers = os.fdopen(descriptor, "wb")
@@ -146,7 +147,7 @@ def write_answer(answer: Answer) -> dict[str, object]:
 
 
 def read_answer(line: bytes) -> Answer:
-    """The answer that a line holds; `Unknown("garbage")` if it holds none."""
+    """The answer that a line holds; `NoAnswer("garbage")` if it holds none."""
     try:
         message: dict[str, Any] = json.loads(line)
     except ValueError:

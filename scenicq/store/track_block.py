@@ -1,4 +1,4 @@
-"""Recordings of one part side by side: columns over all label objects, and where each track is seen.
+"""Recordings of one part of a dataset, read as columns over their label objects and egos.
 
 The *members* of a block are numbered: its label objects in the order of the store, then the ego of each of its labels.
 No member at all is -1, which every column answers with nan, so that a column of members gives a column of values.
@@ -27,13 +27,13 @@ __all__ = ["TrackBlock", "TrackReach", "in_order"]
 Numbers = NDArray[np.float64]
 Integers = NDArray[np.int64]
 _LONG = 500
-"""Labels of a recording of which no more is read than is asked about."""
+"""A recording with more labels than this is read only as far as `TrackReach` asks."""
 _CODED = ("class", "attributes")
-"""Columns of texts, of objects and egos, that are read as numbers of distinct ones."""
+"""Text columns of objects and egos. They are read as indices into the distinct texts."""
 
 
 def in_order(numbers: Integers) -> Integers:
-    """Sort numbers that are not negative, stably: the place of each, from the least on."""
+    """A stable argsort of numbers that are not negative."""
     # sorting is faster than finding the order
     size = max(len(numbers), 1)
     return np.sort(numbers * size + np.arange(len(numbers))) % size
@@ -117,7 +117,7 @@ class TrackBlock:
         self._id_ranks: Integers | None = None
 
     def _track_rows(self, starts: Integers, rows: Integers, reach: TrackReach | None) -> Integers:
-        """The rows of the label objects of the tracks of some, as far as they are asked about.
+        """The rows of all label objects on the tracks that are asked about, within reach.
 
         Args:
             starts: The row with which the objects of each label begin, and behind the last one's.
@@ -136,7 +136,7 @@ class TrackBlock:
             if low < high:
                 mine = codes[rows[low:high] - first]
                 wanted[mine] = True
-                # what has no track is one of its own
+                # the last code stands for no track name: each such object is alone on its track
                 wanted[-1] = False
                 chosen[begin:end] |= wanted[codes[begin:end]]
                 wanted[mine] = False
@@ -185,7 +185,7 @@ class TrackBlock:
         return found
 
     def labels_after(self, labels: Integers, time_s: float) -> Integers:
-        """The first label of the same recording that is at least so many seconds after some; behind all if none is.
+        """For each label, the first one of its recording at least `time_s` later; `len(self)` if there is none.
 
         Args:
             labels: The labels.
@@ -232,7 +232,7 @@ class TrackBlock:
         return bool(((members >= self.object_count) | (members < 0)).all())
 
     def members(self, rows: Integers) -> Integers:
-        """The label objects that are in some rows of their part."""
+        """The members in some rows of `objects`, which must be among those that were read."""
         return np.searchsorted(self._rows, rows)
 
     def numbers(self, name: str) -> Numbers:
@@ -245,7 +245,7 @@ class TrackBlock:
         return self._numbers[name]
 
     def said(self) -> tuple[NDArray[np.int64], list[Mapping[str, Any]]]:
-        """Attributes: for each member the number of its attributes, and the distinct ones."""
+        """For each member an index into the distinct attributes, and these."""
         if self._said is None:
             codes, texts = self._member_codes("attributes")
             self._said = np.append(codes, len(texts)).astype(np.int64), [*map(json.loads, texts), {}]
@@ -293,7 +293,7 @@ class TrackBlock:
         return bool((self.tracks(members) < len(self.runs) * (len(self._names()[1]) + 1)).all())
 
     def ranks(self, members: Integers) -> Integers:
-        """Order the tracks of members of one recording by name; all members have a track."""
+        """The rank of each member's track by name. All members have named tracks in one recording."""
         names = np.array(self._names()[1], dtype=object)
         order = np.empty(len(names) + 1, np.int64)
         order[np.argsort(names, kind="stable")] = np.arange(len(names))

@@ -37,7 +37,7 @@ class HiddenValue:
 
     Attributes:
         leaf: The random variable.
-        rows: Which rows of all coordinates are its own.
+        rows: Its rows in the array of all coordinates: one for a number, two for a point.
         low, high: Ends of each coordinate, (k, 1).
     """
 
@@ -57,8 +57,8 @@ class HiddenValue:
         """Whether only whole numbers count."""
         return isinstance(self.leaf, Index | DiscreteRange)
 
-    def drawn(self, rng: np.random.Generator, count: int) -> NDArray[np.float64]:
-        """Coordinates evenly over all that there is, (k, count); where there are no ends, not far from zero."""
+    def draw(self, rng: np.random.Generator, count: int) -> NDArray[np.float64]:
+        """Draw coordinates evenly between the ends, (k, count); an infinite end becomes one not far from zero."""
         low = np.where(np.isfinite(self.low), self.low, np.minimum(self.high, _FAR) - 2 * _FAR)
         high = np.where(np.isfinite(self.high), self.high, np.maximum(low, -_FAR) + 2 * _FAR)
         return low + rng.random((len(low), count)) * (high - low + self.is_whole) - 0.5 * self.is_whole
@@ -87,7 +87,7 @@ class HiddenValue:
         return Column(numbers, status)
 
     def _points(self, region: Column, place: NDArray[np.float64]) -> Column:
-        """The points of a region, or one for each draw, that are nearest to places (2, n)."""
+        """The points nearest to places (2, n) in a region, which may differ from draw to draw."""
         places = ColumnPlaces((region, Column((place[0], place[1]), np.full(1, DEFINED))))
         xy = np.full((places.count, 2), np.nan)
         near = (float(self.low[0, 0]), float(self.low[1, 0]), float(self.high[0, 0]), float(self.high[1, 0]))
@@ -113,4 +113,4 @@ def _nearest(region: Value, xy: NDArray[np.float64], near: tuple[float, float, f
 
 
 _FAR = 100.0
-"""Metres or any other unit: how far from zero a number is looked for that nothing bounds."""
+"""How far from zero an unbounded number is drawn, in its own unit."""

@@ -1,10 +1,10 @@
-"""A witness by search: draws of the random variables, the best of which are led to what the label observes.
+"""A search for a witness: draws of the random variables, and steps from the best towards what the label observes.
 
-A yes needs one witness, only a no needs the whole space. Draws lie where what is observed leaves the hidden variables,
-those of choices among the outcomes that are left. The best descend by damped Gauss-Newton steps on what is missing;
-fields point in each as in the draw that it came from. The next draws lie around the best (cross-entropy method) or
-anywhere. Every witness is replayed by plain evaluation. It refutes nothing; so all searches of one label have one
-budget (`scenicq.budget.Trials`), of which each may take a share.
+A yes needs one witness; a no needs the whole space, so this search refutes nothing. It draws within the ranges that
+observation leaves to the hidden variables, and among the outcomes left to choices. The best draws descend by damped
+Gauss-Newton steps on their residuals, with slopes that hold the headings of fields. The next draws lie around the best
+(cross-entropy method), and some anywhere. Plain evaluation replays every witness. All searches for one label share one
+budget (`scenicq.budget.Trials`); each may take a part of what is left.
 """
 
 from __future__ import annotations
@@ -34,19 +34,22 @@ from scenicq.match.tolerance import SLACK, Tolerance
 __all__ = ["AGAIN", "QUICK", "THOROUGH", "Effort", "OutcomeTable", "find_witness", "search_witness"]
 
 OutcomeTable = tuple[Sequence[object], NDArray[np.intp]]
-"""What choices may come out as: their identities, and by outcome which option each takes, -1 where none matters."""
+"""Joint outcomes of some choices: their identities, and the option of each by outcome, shape (outcomes, choices).
+
+An option is -1 where it does not matter.
+"""
 
 
 @dataclass(frozen=True, slots=True)
 class Effort:
-    """How much a search is worth.
+    """How much work one search may do.
 
     Attributes:
-        draws: Values of each random variable that are tried at once.
-        best: How many of these descend, and have others drawn around them.
-        rounds: How often draws are made.
-        descents: Steps of each descent.
-        idle: Rounds in a row without progress after which it ends.
+        draws: Draws that a round tries at once.
+        best: How many of the best draws descend; the next draws lie around them.
+        rounds: Rounds at most.
+        descents: Steps of each descent at most.
+        idle: The search ends after so many rounds in a row without progress.
     """
 
     draws: int
@@ -59,29 +62,29 @@ class Effort:
 QUICK = Effort(96, 8, 6, 3, 1)
 THOROUGH = Effort(384, 24, 4, 6, 2)
 AGAIN = (QUICK, QUICK, QUICK, THOROUGH, THOROUGH)
-"""Searches one after the other, each from other draws: where fields turn often, many a way is found by luck."""
+"""Searches in a row, each with its own draws. Where fields turn often, luck finds many a way, so more tries help."""
 _CLOSER = 0.45
-"""The share of the spread of one round that the next one has."""
+"""Each round spreads its draws by this factor of the round before."""
 _PROGRESS = 0.7
-"""A round that leaves more than this share of what is missing made no progress."""
+"""A round made no progress if the least residual stays above this share of the least one before."""
 _ANEW = 0.15
-"""The share of draws near the best in which a choice, or the heading of a field, comes out anew."""
+"""The probability that a draw near the best draws a choice, or a field's heading, again."""
 _OTHER = 0.5
-"""The share of fields that have another heading than the first, where that comes out anew."""
+"""The probability that a heading that is drawn again may differ from the field's first one."""
 _ANYWHERE = 4
 """One of so many draws after the first round lies anywhere."""
 _ALIKE = 0.02
-"""Radians within which a field points alike in two draws."""
+"""Two headings of a field count as alike if they round to the same multiple of so many radians."""
 _SHARE = 4
-"""A search takes one of so many parts of the trials that are left at most."""
+"""A search may use the trials that are left, divided by this."""
 _STEP = 1e-5
 """By how much a coordinate is moved to see what changes."""
 _PLENTY = 4
-"""So many times more draws are made where some break what is required of numbers alone."""
+"""Where there are conditions on numbers alone, so many times the draws are made; the least broken ones stay."""
 _JUMP = 1e3
-"""A change per unit above which a field has pointed another way."""
+"""A slope this steep is a jump of a field's heading, and counts as 0."""
 _FEW, _NARROW = 4, 0.01
-"""Draws of the first round where no coordinate is wider than this."""
+"""The first round has so few draws if no coordinate has a wider range than this and no field is asked."""
 
 _Numbers = NDArray[np.float64]
 _Indices = NDArray[np.intp]
@@ -117,7 +120,7 @@ def search_witness(
     outcomes: Sequence[OutcomeTable] = (),
     seed: int = 0,
 ) -> Satisfied | None:
-    """A witness of constraints, conditioned, or None if none was found; other arguments as of `find_witness`."""
+    """Narrow the ranges that constraints leave, and search there for a witness; None if none is found."""
     start = BoxSet.start(ConstraintNetwork(items, tolerance), {}).narrowed()
     return find_witness(start, *efforts, outcomes=outcomes, seed=seed) if start.size else None
 
@@ -150,7 +153,7 @@ class _Search:
             found = self._witness(tried)
             if found is None and self.space.fields and len(self.space.moving):
                 # how good a draw is shows where it leads
-                led = self._try(self._led(tried))
+                led = self._try(self._one_step(tried))
                 found = self._witness(led)
                 tried = tried.beside(led)
             best = self._best(tried)
@@ -159,7 +162,7 @@ class _Search:
             elite = self._better(elite, best)
             for _ in range(self.effort.descents if len(self.space.moving) else 0):
                 left = float(best.residuals.missing.min())
-                best = self._descended(best)
+                best = self._best_step(best)
                 found = self._witness(best)
                 if found is not None:
                     return found
@@ -171,7 +174,7 @@ class _Search:
             before = min(before, least)
             if self.replayed >= LIMITS.witness_replays or idle == self.effort.idle:
                 break
-            draws = self._near(elite.draws, _CLOSER**number)
+            draws = self._draw_near(elite.draws, _CLOSER**number)
         return None
 
     def _try(self, draws: TrialDraws) -> Trial:
@@ -192,18 +195,18 @@ class _Search:
         return self.effort.draws if wide else _FEW
 
     def _anywhere(self, count: int) -> TrialDraws:
-        """All over what there is, most where a way leads to what is observed."""
+        """Draws over all ranges; most begin where a way along fields leads to what is observed."""
         draws = self._evenly(count)
         self.back.put_into(draws)
         return draws
 
     def _evenly(self, count: int) -> TrialDraws:
         """Evenly over all that there is, as far as conditions on numbers alone allow."""
-        return self.space.least_broken(self._drawn((_PLENTY if self.space.plain else 1) * count), count)
+        return self.space.least_broken(self._draw((_PLENTY if self.space.plain else 1) * count), count)
 
-    def _drawn(self, count: int) -> TrialDraws:
+    def _draw(self, count: int) -> TrialDraws:
         """Evenly over all that there is."""
-        parts = [each.drawn(self.rng, count) for each in self.space.hidden.values()]
+        parts = [each.draw(self.rng, count) for each in self.space.hidden.values()]
         shares = self.rng.random((len(self.space.fields), count))
         # where lanes overlap, a generator takes the first
         shares[:, ::2] = 0.0
@@ -213,7 +216,7 @@ class _Search:
         return draws
 
     def _choose(self, places: _Numbers, some: NDArray[np.intp]) -> None:
-        """Choices of some draws come out as any of the outcomes that are left."""
+        """Give the choices of some draws a random outcome of those that are left, in place."""
         for variables, picks in self.tables:
             if not (variables and len(picks)):
                 continue
@@ -222,7 +225,7 @@ class _Search:
                 chosen = rows[:, column]
                 places[variable.rows.start, some[chosen >= 0]] = chosen[chosen >= 0]
 
-    def _near(self, best: TrialDraws, spread: float) -> TrialDraws:
+    def _draw_near(self, best: TrialDraws, spread: float) -> TrialDraws:
         """The best again, others around them, and some anywhere."""
         count, first = self.effort.draws, best.places.shape[1]
         near = best.take(np.arange(count - count // _ANYWHERE) % first)
@@ -238,7 +241,7 @@ class _Search:
         for each in self.space.hidden.values():
             if each.is_whole:
                 moved = self._some((size,), still)
-                near.places[each.rows, moved] = each.drawn(self.rng, size)[:, moved]
+                near.places[each.rows, moved] = each.draw(self.rng, size)[:, moved]
         self._choose(near.places, np.flatnonzero(self._some((size,), still)))
         anew = self._some(near.shares.shape, still)
         if self.space.fields:
@@ -250,7 +253,7 @@ class _Search:
         return near.beside(more)
 
     def _some(self, shape: tuple[int, ...], still: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """What comes out anew, in draws that do not stand still."""
+        """Mark at random what is drawn again; nothing is in draws that stand still."""
         return (self.rng.random(shape) < _ANEW) & ~still
 
     def _best(self, tried: Trial) -> Trial | None:
@@ -262,7 +265,7 @@ class _Search:
         return tried.take(some) if len(some) else None
 
     def _unlike(self, tried: Trial, order: _Indices) -> _Indices:
-        """Draws in an order, the first of those alone in which choices and fields come out the same."""
+        """The order without repeats: where choices and headings agree, only the first draw stays."""
         alike = np.concatenate([tried.draws.places[self.space.whole], np.round(tried.headings / _ALIKE)])[:, order]
         if not len(alike):
             return order
@@ -278,7 +281,7 @@ class _Search:
         return best or elite
 
     def _witness(self, tried: Trial) -> Satisfied | None:
-        """A witness among draws of which nothing is missing."""
+        """The first draw without residuals that plain evaluation confirms."""
         missing = tried.residuals.missing
         for number in np.flatnonzero(missing <= 0)[: LIMITS.witness_replays - self.replayed].tolist():
             self.replayed += 1
@@ -293,7 +296,7 @@ class _Search:
 
     # --- descent
 
-    def _led(self, tried: Trial) -> TrialDraws:
+    def _one_step(self, tried: Trial) -> TrialDraws:
         """Each draw after one step towards what is observed."""
         each = np.where(np.isfinite(tried.residuals.each), tried.residuals.each, 0.0)
         step = damped_steps(self._slopes(tried), each, self._at_ends(tried.draws.places))[0]
@@ -302,8 +305,8 @@ class _Search:
         led.places[self.space.moving] += step
         return led
 
-    def _descended(self, tried: Trial) -> Trial:
-        """Each draw after the best of some damped steps, also where that is worse: fields point elsewhere there."""
+    def _best_step(self, tried: Trial) -> Trial:
+        """Each draw after the best of several damped steps, even if its residual grows, as fields turn there."""
         rows = cast(_Indices, np.arange(tried.draws.places.shape[1]))
         each = np.where(np.isfinite(tried.residuals.each), tried.residuals.each, 0.0)
         moves = damped_steps(self._slopes(tried), each, self._at_ends(tried.draws.places))

@@ -39,7 +39,7 @@ _NOT_SEEN = frozenset({
     "position", "behavior", "requireVisible", "allowCollisions", "regionContainedIn", "visibleDistance", "viewAngle",
     "cameraOffset", "mutationScale", "positionStdDev", "headingStdDev", "parentOrientation", "yaw", "baseOffset",
 })  # fmt: skip
-"""Properties that every label has, and those by which a program says what is seen, required or simulated."""
+"""Properties that are never warned about: every label has them, or they govern sight, requirements, simulation."""
 _SAMPLED = 1000
 
 
@@ -50,7 +50,7 @@ class Coverage:
     Attributes:
         warnings: One for each property that no label has (never-compared), and for each class that no label object has
             (class-absent); no-tracks, where nothing has a track.
-        missing: Frames in which a property is missing that others have, by its name in the program.
+        missing: How many frames lack a property that other frames have, by its name in the program.
     """
 
     warnings: tuple[Diagnostic, ...] = ()
@@ -81,7 +81,7 @@ class _Setting:
 
 
 def _settings(scenario: Scenario, options: MatchOptions) -> Iterator[_Setting]:
-    """What a scenario sets or reads, each place once."""
+    """Yield what a scenario sets or reads; `coverage` drops repeated places."""
     for name, given in scenario.params.items():
         if given.explicit and name not in options.ignore_params:
             yield _Setting(f"param {name}", name, "", ego=True, span=given.span)
@@ -102,7 +102,7 @@ def _settings(scenario: Scenario, options: MatchOptions) -> Iterator[_Setting]:
 
 
 def _only_read(scenario: Scenario, options: MatchOptions) -> Iterator[_Setting]:
-    """What a scenario reads and labels alone tell: no default stands in where they do not."""
+    """Properties that a scenario reads and only labels tell. No default replaces a missing one."""
     frame, over_time = (
         "read here: a frame that depends on it is unknown",
         "read here: an interval that depends on it is unknown",
@@ -160,7 +160,7 @@ def coverage(dataset: Dataset, scenarios: Iterable[Scenario], options: MatchOpti
 
 
 def _without_objects(dataset: Dataset, scenarios: Iterable[Scenario], options: MatchOptions) -> Iterator[Diagnostic]:
-    """A warning for each class of a role that no label object has, with those above it that some have."""
+    """A warning for each class that a role needs and no label object has; hints name those above it that some have."""
     counts = dataset.manifest.by_class
     if not counts:
         return
@@ -210,7 +210,7 @@ def _present(each: _Setting) -> str:
 def _counts(
     dataset: Dataset, connection: duckdb.DuckDBPyConnection, asked: list[_Setting], options: MatchOptions
 ) -> dict[_Setting, tuple[int, int, int]]:
-    """For each property the rows that could have it, those that do, and the frames in which one does not."""
+    """For each property: how many rows could have it, how many have it, and how many frames have a row without it."""
     found: dict[_Setting, tuple[int, int, int]] = {}
     for table in ("labels", "objects"):
         mine = [each for each in asked if _table(each) == table]
@@ -246,7 +246,7 @@ def _row(dataset: Dataset, connection: duckdb.DuckDBPyConnection, columns: list[
 
 
 def _perhaps_missing(dataset: Dataset, found: Iterable[_Setting]) -> list[_Setting]:
-    """The properties without those whose column has a value in every row, by the statistics of the files."""
+    """Drop the properties whose column has a value in every row, as the files' statistics say."""
     asked = [each for each in found if each.comparable]
     full = {
         (table, name)
@@ -277,7 +277,7 @@ def _full_columns(dataset: Dataset, table: str, names: Collection[str | None]) -
 
 
 def _known(dataset: Dataset, connection: duckdb.DuckDBPyConnection, each: _Setting, options: MatchOptions) -> list[str]:
-    """The properties that labels have of such an object beside class and position, or the parameters that they have."""
+    """Names of the properties, besides class and position, that labels give such an object; or of their parameters."""
     table, prefix = (dataset.scan("labels"), "ego_") if each.ego else (dataset.scan("objects"), "")
     own = f"{prefix}class IN {_classes(each.category, options)}" if each.category else "true"
     names: list[str] = []

@@ -34,7 +34,7 @@ class SatisfiedConstraint:
         what: The feature or requirement, in the words of the program.
         value: What the label shows.
         allowed: What the program allows; empty where that cannot be said in a few words.
-        spare: How much is left, or by how much the tolerance is needed.
+        spare: In words: how far inside the value is ("to spare"), or how far outside; may be empty.
         span: Where the program says it.
     """
 

@@ -1,8 +1,9 @@
 """How many matches depend on the tolerance: frames that would not match if positions, or headings, had to be exact.
 
-Matches are decided again without that part of the tolerance, in random order and as many as there is time for. An
-interval is decided at its first frame with the objects in its roles, since tolerances do not apply to conditions over
-time. A frame that is then undecided does not count.
+Each match is decided again, once with exact positions and once with exact headings: within 1 mm and 1 mrad (`EXACT`).
+The order is random, and the work ends when the time is up. An interval is decided at its first frame, with its objects
+in their roles, because tolerances do not apply to conditions over time. A match that is then undecided counts as
+decided again, but not as dependent on the tolerance.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from scenicq.query.execution.results import Result
 from scenicq.query.execution.run import Query
 from scenicq.store.labels import Label
 
-__all__ = ["ToleranceShare", "by_tolerance_alone"]
+__all__ = ["ToleranceCounts", "by_tolerance_alone"]
 
 _TOGETHER = 10
 """Matches whose frames are read at once."""
@@ -32,7 +33,7 @@ _PLACES = ("position", "x", "y")
 
 
 @dataclass(frozen=True, slots=True)
-class ToleranceShare:
+class ToleranceCounts:
     """How many matches depend on the tolerance.
 
     Attributes:
@@ -45,7 +46,7 @@ class ToleranceShare:
     headings: int
 
 
-def by_tolerance_alone(query: Query, matches: Sequence[Result], budget_s: float) -> ToleranceShare:
+def by_tolerance_alone(query: Query, matches: Sequence[Result], budget_s: float) -> ToleranceCounts:
     """Count how many of some matches depend on the tolerance, as far as there is time.
 
     Args:
@@ -66,7 +67,7 @@ def by_tolerance_alone(query: Query, matches: Sequence[Result], budget_s: float)
             for result in some:
                 label = labels[result.frame]
                 if time.monotonic() >= until:
-                    return ToleranceShare(counted, *alone)
+                    return ToleranceCounts(counted, *alone)
                 if label.map not in matchers:
                     scenario = query.compiled_map(label.map).scenario
                     options = replace(query.options.match, timeout_s=min(query.options.match.timeout_s, _LONGEST_S))
@@ -77,26 +78,29 @@ def by_tolerance_alone(query: Query, matches: Sequence[Result], budget_s: float)
                 counted += 1
                 for number, matcher in enumerate(matchers[label.map]):
                     alone[number] += matcher is not None and _fails(matcher, label, result)
-    return ToleranceShare(counted, *alone)
+    return ToleranceCounts(counted, *alone)
 
 
 def _fails(matcher: Matcher, label: Label, result: Result) -> bool:
     if result.interval is None:
         return isinstance(matcher.match(label), NoMatch)
-    # others come later
+    # objects that come later in the interval are not in this scenario
     there = {each.name for each in matcher.scenario.objects}
     roles = {name: member for name, member in roles_in(label, result).items() if name in there}
     return isinstance(matcher.match(label, fixed_roles=roles), NoMatch)
 
 
 def _exact_places(tolerance: Tolerance) -> Tolerance:
-    """A tolerance with positions as of generated labels, where they are not more exact."""
+    """The tolerance with exact positions (`EXACT`); a smaller size for positions stays."""
     rules = tuple(rule for rule in tolerance.rules if rule[1] not in _PLACES)
     return replace(tolerance, x=None, y=None, position=min(tolerance.position, EXACT.position), rules=rules)
 
 
 def _exact_headings(tolerance: Tolerance, scenario: Scenario) -> Tolerance:
-    """A tolerance with such headings of the objects of which the program says one; roads turn nobody exactly."""
+    """The tolerance with exact headings for the objects whose heading the program sets.
+
+    Other headings keep their tolerance, since nobody follows the direction of a road exactly.
+    """
     said = [each.name for each in scenario.objects if each.properties["heading"].explicit]
     others = tuple(rule for rule in tolerance.rules if rule[1] != "heading" or rule[0] not in said)
     return replace(tolerance, rules=(*others, *((name, "heading", EXACT.heading) for name in said)))

@@ -1,4 +1,4 @@
-"""Global parameters as necessary conditions on the frame."""
+"""Necessary conditions on a frame, from the global parameters (`param`) that a program sets."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["param_conditions"]
 
 
 def param_conditions(scenario: Scenario, options: MatchOptions) -> list[ColumnCondition]:
-    """What the parameters that a program sets demand of those of a label, where it has them.
+    """SQL conditions that every matching frame meets: its label has parameter values that the program allows.
 
     Args:
         scenario: The scenario.

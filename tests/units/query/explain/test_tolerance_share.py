@@ -11,7 +11,7 @@ from scenicq.match.options import MatchOptions
 from scenicq.match.tolerance import parse_tolerance
 from scenicq.match.verdict import Match
 from scenicq.query.execution.run import Query, QueryOptions
-from scenicq.query.explain.tolerance_share import ToleranceShare, by_tolerance_alone
+from scenicq.query.explain.tolerance_share import ToleranceCounts, by_tolerance_alone
 from scenicq.store.dataset import open_dataset
 
 MODEL = "model scenic.domains.driving.model\n"
@@ -62,7 +62,7 @@ def test_it_counts_what_an_exact_part_leaves_out(crossroads, name, what):
 
 def test_there_may_be_no_time(crossroads):
     query, found = matching(open_dataset(crossroads), PROGRAMS["an edge"], "0.3")
-    assert by_tolerance_alone(query, found, 0.0) == ToleranceShare(0, 0, 0)
+    assert by_tolerance_alone(query, found, 0.0) == ToleranceCounts(0, 0, 0)
 
 
 def test_an_interval_counts_by_its_first_frame(crossroads):
