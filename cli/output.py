@@ -74,6 +74,8 @@ def destination(file: AnyPath | None, folder: AnyPath | None = None) -> Generato
     """
     if file is None:
         yield results().buffer
+        # what is lost of the last bytes is told, too
+        results().buffer.flush()
     elif isinstance(file, RemotePath):
         target_of(file).check_writable()
         with whole_file(file) as sink:

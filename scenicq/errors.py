@@ -110,6 +110,7 @@ CODES: dict[str, str] = {
     "no-tracks": "the program is about time, but nothing says which objects of different labels are the same",
     # what compiles but cannot be meant
     "angle-without-deg": "an angle is more than a full turn, so it may be meant in degrees",
+    "deviation-without-deg": "how an object is turned from the road is a plain number, and so in radians",
     "exact-number": "a measured number is compared with `==`",
     "facing-object": "an object stands where a heading is expected",
     "heading-implied": "a specifier of the place also gives a heading, to an object that may face anywhere",

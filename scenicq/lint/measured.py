@@ -38,6 +38,7 @@ def lint_measured(nodes: list[ast.SyntaxNode], values: Values) -> Iterator[Diagn
     """
     for node in nodes:
         yield from _angles(node, values)
+        yield from _deviations(node, values)
         yield from _sums(node)
         yield from _differences(node)
     yield from _signed(nodes)
@@ -70,6 +71,26 @@ def _angles(node: ast.SyntaxNode, values: Values) -> Iterator[Diagnostic]:
                     "angle-without-deg", f"`{text}` is an angle of {abs(value) / math.tau:.1f} full turns", term.span,
                     "angles are in radians", f"write `{text} deg` for degrees",
                 )  # fmt: skip
+
+
+def _deviations(node: ast.SyntaxNode, values: Values) -> Iterator[Diagnostic]:
+    """Plain numbers for how an object is turned from the road: metres beside its lane may be meant, or degrees."""
+    match node:
+        case ast.WithSpecifier(property="roadDeviation", value=place):
+            pass
+        case ast.PropertyDefault(name="roadDeviation", value=place):
+            pass
+        case _:
+            return
+    for term in terms(place, values):
+        value = literal_number(term)
+        if value and abs(value) <= _FULL_TURN and not ast.is_phrase(term, phrases.DEG):
+            text, degrees = term.span.text, f"{math.degrees(value):.3g} deg"
+            yield make_warning(
+                "deviation-without-deg", f"`roadDeviation` turns an object from the road, `{text}` by {degrees}",
+                term.span, "an angle in radians", f"write `{degrees}`, or `{text} deg` for degrees",
+                "`left of SPOT by M` and `right of SPOT by M` place an object M metres beside a spot",
+            )  # fmt: skip
 
 
 def _facing_objects(nodes: list[ast.SyntaxNode]) -> Iterator[Diagnostic]:

@@ -41,7 +41,7 @@ from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
 __all__ = ["RoleCandidates", "StartMatchers", "StartSearch", "Starts", "narrow_candidates"]
 
 Members = NDArray[np.int64]
-_AT_ONCE = 200_000
+_AT_ONCE = 16_384
 _SCALARS = frozenset({"heading", "width", "length", "height"})
 
 

@@ -269,3 +269,39 @@ def test_a_picture_is_what_its_name_says(crossroads, tmp_path):
 def test_python_says_what_cannot_be_meant(crossroads):
     (told,) = scenicq.open(crossroads).match("ego = new Car facing 90").warnings
     assert "angle-without-deg" in told
+
+
+ODD_TEXTS = [
+    "", " ", "nan", "-", "//", "\\", "a=b=c", "=1", "1,,2", "x" * 3000, "None", "{}", "\u202e", "caf\u00e9\u0301", "*",
+    "'", "s3:", "s3://", "://", "~nobody/x",
+]  # fmt: skip
+TEXTS = [each for each in ALL if each not in TYPED and not each.values[2].is_flag]
+FLAGS = [each for each in ALL if each.values[2].is_flag and each.values[2].name not in ("help", "version")]
+
+
+@pytest.mark.parametrize(("name", "command", "option"), TEXTS)
+@pytest.mark.one_in(4)
+def test_an_odd_text_is_told_and_nothing_is_done(name, command, option, run, tmp_path, monkeypatch):
+    """Where the other arguments are wrong too, one thing is told, and no text is too odd for that."""
+    monkeypatch.chdir(tmp_path)
+    for text in ODD_TEXTS:
+        for value in ([text] * option.nargs, None):
+            given = words(command, option, value) if value else words(command, None, [])
+            surroundings = {} if value else {variable_of(command, option): " ".join([text] * option.nargs)}
+            done = run(name, *given, env=surroundings)
+            assert done.exit_code == 2, (text, done.output)
+            assert done.stderr.count("error[") + done.stderr.count("Error: ") == 1, (text, done.stderr)
+            assert "internal error" not in done.stderr, (text, done.stderr)
+            assert done.stdout == ""
+    assert not any(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(("name", "command", "option"), FLAGS)
+@pytest.mark.one_in(4)
+def test_a_flag_is_no_other_word(name, command, option, run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for text in ("maybe", "2", "nan", "-1", "[]", "tru e"):
+        done = run(name, *words(command, None, []), env={variable_of(command, option): text})
+        assert done.exit_code == 2, (text, done.output)
+        assert done.stderr.splitlines()[-1].startswith("Error: Invalid value for "), (text, done.stderr)
+    assert not any(tmp_path.iterdir())
