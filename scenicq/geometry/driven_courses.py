@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 from shapely import STRtree
 from shapely.geometry import LineString, MultiPolygon, Polygon
 
+from scenicq.budget import look
 from scenicq.geometry import shapes
 from scenicq.geometry.angles import azimuth_array, direction
 from scenicq.geometry.boxes import box_polygons
@@ -68,7 +69,7 @@ _JOINT_M = 1.0
 """How far apart lanes may begin at a place for one to go on in the other."""
 _KNOWN = 4096
 """Measures that are kept of a course."""
-_AT_ONCE = 16_384
+_AT_ONCE = 4_096
 """Places that are measured at once."""
 _FEW = 2_000
 """Pairs of places and segments that are looked at without a search."""
@@ -261,9 +262,16 @@ NO_COURSE = CoursePlace(None)
 class StoredCourse(CoursePlace):
     """A course of which it is known where some places are; the line is made when something else is asked."""
 
-    def __init__(self, known: Mapping[tuple[float, float], _Ends], make: Callable[[], CoursePlace]) -> None:
-        """Take the ends of the places that are known, and what makes the course."""
-        vars(self).update(_known=known, _make=make)
+    def __init__(
+        self, known: Callable[[], Mapping[tuple[float, float], _Ends]], make: Callable[[], CoursePlace]
+    ) -> None:
+        """Take what tells the ends of the places that are known, and what makes the course."""
+        vars(self).update(_tell=known, _make=make)
+
+    @cached_property
+    def _known(self) -> Mapping[tuple[float, float], _Ends]:
+        tell: Callable[[], Mapping[tuple[float, float], _Ends]] = vars(self)["_tell"]
+        return tell()
 
     @cached_property
     def _made(self) -> CoursePlace:
@@ -272,8 +280,7 @@ class StoredCourse(CoursePlace):
 
     def stored_ends(self, x: float, y: float) -> _Ends | None:
         """The ends that are known of a place without the line."""
-        known: Mapping[tuple[float, float], _Ends] = vars(self)["_known"]
-        return known.get((x, y))
+        return self._known.get((x, y))
 
     @property
     def line(self) -> CourseLine | None:  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -330,6 +337,7 @@ def measure(courses: Sequence[CoursePlace], xy: Numbers) -> Measures:
     for numbers in by_line.values():
         line = cast(CourseLine, courses[numbers[0]].line)
         for first in range(0, len(numbers), _AT_ONCE):
+            look()
             some = numbers[first : first + _AT_ONCE]
             mine = [(courses[each], places[each]) for each in some]
             asked = [(each.s, each.time_s, each.sign, *place) for each, place in mine]
@@ -480,6 +488,7 @@ def track_courses(network: Network, times_s: Numbers, places: Numbers, gap_s: fl
     cuts = np.flatnonzero(np.diff(times_s) > gap_s) + 1
     found: list[CoursePlace] = []
     for first, end in pairwise([0, *cuts.tolist(), len(times_s)]):
+        look()
         found += _stretch(network, times_s[first:end], places[first:end])
     return found
 

@@ -35,6 +35,7 @@ __all__ = [
     "MOTION_COLUMNS",
     "OBJECT_COLUMNS",
     "assemble",
+    "course_ends",
     "read_labels",
 ]
 
@@ -167,10 +168,18 @@ def _on_ego_course(table: ArrowTable, prefix: str) -> Iterable[tuple[float, floa
     """The ends between which each row is along and beside the ego's course, where the table has them."""
     if prefix or COURSE_COLUMNS[0] not in table.column_names:
         return repeat(None)
+    return course_ends([table[name].to_numpy() for name in COURSE_COLUMNS])
+
+
+def course_ends(columns: Sequence[NDArray[np.float64]]) -> Iterable[tuple[float, float, float, float]]:
+    """The ends between which label objects are along and beside the ego's course.
+
+    Args:
+        columns: `COURSE_COLUMNS`, each of shape (n,).
+    """
     ends: list[NDArray[np.float64]] = []
-    for first in (0, 3):
+    for value, less, more in (columns[:3], columns[3:]):
         # nan where there is no end
-        value, less, more = (table[name].to_numpy() for name in COURSE_COLUMNS[first : first + 3])
         ends += [np.nan_to_num(value - less, nan=-np.inf), np.nan_to_num(value + more, nan=np.inf)]
     return zip(*(each.tolist() for each in ends), strict=True)
 

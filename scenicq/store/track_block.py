@@ -10,15 +10,17 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scenicq.geometry.driven_courses import CoursePlace, lane_course
+from scenicq.budget import look
+from scenicq.geometry.driven_courses import GAP_S, CoursePlace, StoredCourse, lane_course
 from scenicq.geometry.network import Network
 from scenicq.store.dataset import Dataset
-from scenicq.store.recorded_tracks import RecordingCourses
+from scenicq.store.reader import COURSE_COLUMNS, course_ends
 from scenicq.store.row_block import RowBlock
 from scenicq.store.tracks import TrackKey
 
@@ -37,6 +39,10 @@ def in_order(numbers: Integers) -> Integers:
     # sorting is faster than finding the order
     size = max(len(numbers), 1)
     return np.sort(numbers * size + np.arange(len(numbers))) % size
+
+
+_LOOK_EVERY = 1_024
+"""Courses between two looks at the clock."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -341,19 +347,35 @@ class TrackBlock:
         """
         found: list[CoursePlace | None] = [None] * len(members)
         labels = self.label_of[members]
-        names: dict[int, RecordingCourses] = {}
         for place in np.argsort(self.recording_of[np.maximum(labels, 0)], kind="stable").tolist():
             if members[place] < 0:
                 continue
-            label = int(labels[place])
-            number = int(self.recording_of[label])
-            if number not in names:
-                names = {number: self.recorded.of(self.name(number))}
-            sample, member = label - self.runs[number][0], int(members[place])
-            track = self.key(member)
-            seen = None if track[0] == "object" else names[number].course(network, gap_s, track, sample)
-            found[place] = seen or lane_course(network, *self._place(member))
+            if place % _LOOK_EVERY == 0:
+                look()
+            member = int(members[place])
+            make = partial(self._course, member, network, gap_s)
+            if member < self.object_count or gap_s != GAP_S:
+                found[place] = make()
+            else:
+                found[place] = StoredCourse(partial(self._on_ego_course, int(labels[place])), make)
         return found
+
+    def _course(self, member: int, network: Network, gap_s: float) -> CoursePlace:
+        """The course of a member, made of the samples of its track."""
+        label = int(self.label_of[member])
+        number, track = int(self.recording_of[label]), self.key(member)
+        seen = None
+        if track[0] != "object":
+            courses = self.recorded.of(self.name(number))
+            seen = courses.course(network, gap_s, track, label - self.runs[number][0])
+        return seen or lane_course(network, *self._place(member))
+
+    def _on_ego_course(self, label: int) -> Mapping[tuple[float, float], tuple[float, float, float, float]]:
+        """Where the objects of a label are on its ego's course, by their places."""
+        rows = slice(int(self.object_starts[label]), int(self.object_starts[label + 1]))
+        x, y = (self.numbers(name)[rows].tolist() for name in ("x", "y"))
+        ends = course_ends([self.numbers(name)[rows] for name in COURSE_COLUMNS])
+        return dict(zip(zip(x, y, strict=True), ends, strict=True))
 
     def _place(self, member: int) -> tuple[float, float, float | None]:
         x, y, heading = (float(self.numbers(name)[member]) for name in ("x", "y", "heading"))

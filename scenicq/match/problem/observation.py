@@ -71,7 +71,7 @@ def observe_course(label: Label, label_object: LabelObject, rules: LaneCourse) -
     if label_object is not label.ego or rules.gap_s != GAP_S:
         return make()
     known = {(each.x, each.y): each.on_ego_course for each in label.objects if each.on_ego_course is not None}
-    return StoredCourse(known, make) if known else make()
+    return StoredCourse(lambda: known, make) if known else make()
 
 
 def course_without_role(label: Label, label_object: LabelObject, rules: LaneCourse | None) -> CoursePlace | None:
