@@ -1,4 +1,4 @@
-"""Any map of some traits: what a program says of the element at a place, whichever that is.
+"""An abstract map: only its traits are known, so that one compiled program serves every map that has them.
 
 `ego.lane` is over an abstract map one element that stands for every lane. What can be said of all lanes alike (where
 "in the lane of the ego" is, as a relation between objects and lanes) is said of it. What a lane leads to by the links
@@ -38,7 +38,7 @@ __all__ = [
 ]
 
 _RANKS = 2
-"""Elements that overlap somewhere: as many as make a program ask which of them is meant."""
+"""The depth of every abstract look-up: two elements may overlap, so programs ask which one is meant."""
 
 
 class NeedsMapError(Exception):
@@ -58,7 +58,7 @@ class AbstractNetwork(Network):
 
 
 class AbstractElement(NetworkElement):
-    """The element of a kind that lies at one place, whichever it is.
+    """The unknown element of one kind at one place. It may be the element at another place, too, so it has no hash.
 
     Whether it is that at another place is not known, so that it has no hash.
 
@@ -67,34 +67,34 @@ class AbstractElement(NetworkElement):
     """
 
     def __init__(self, found: AbstractOccupancy) -> None:
-        """Take what they are."""
+        """Stand for the element that a look-up finds."""
         vars(self).update(found=found, region=AbstractArea(found))
 
     found: AbstractOccupancy
 
     @property
     def kind(self) -> str:
-        """The kind of all of them."""
+        """The kind of the element."""
         return self.found.kind
 
     @property
     def orientation(self) -> NoReturn:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """That of one element."""
+        """Raise `NeedsMapError`: each element has its own."""
         raise NeedsMapError
 
     def __getattr__(self, name: str) -> NoReturn:
-        """Whatever else a program asks for is that of one element."""
+        """Raise `NeedsMapError`: every other attribute differs from element to element."""
         # what `copy` and `pickle` look for is not there
         raise AttributeError(name) if name.startswith("__") else NeedsMapError
 
     def __eq__(self, other: object) -> bool:
-        """Only itself is surely the same, and nothing that is no element."""
+        """Whether both are one object. Another element raises `NeedsMapError`, since it may be the same one."""
         if self is not other and isinstance(other, NetworkElement):
             raise NeedsMapError
         return self is other
 
     def __hash__(self) -> int:
-        """None: two may be one."""
+        """Raise `NeedsMapError`: two abstract elements may be the same element, so no hash fits."""
         raise NeedsMapError
 
     def __repr__(self) -> str:
@@ -111,7 +111,7 @@ class AbstractDirection(DeferredDirection):
 
 
 class AbstractArea(PolygonSet):
-    """The area of any element of a kind.
+    """The unknown area of an abstract element.
 
     Attributes:
         found: What the elements are at each place.
@@ -132,7 +132,7 @@ class AbstractArea(PolygonSet):
 
     @property
     def polygons(self) -> NoReturn:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """Those of one element."""
+        """Raise `NeedsMapError`: each element has its own."""
         raise NeedsMapError
 
     @property
@@ -142,16 +142,16 @@ class AbstractArea(PolygonSet):
 
     @property
     def ids(self) -> NoReturn:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """That of one element."""
+        """Raise `NeedsMapError`: each element has its own."""
         raise NeedsMapError
 
     def __reduce__(self) -> NoReturn:
-        """No copy over a map has it: there is an area of each element."""
+        """Refuse to be copied: a scenario over a real map has areas of that map instead."""
         raise TypeError(f"{self.name} is of no map")
 
 
 class AbstractList:
-    """A list that the element of a kind at one place has, of elements of one kind.
+    """A list attribute of an abstract element, such as the successors of a lane.
 
     What a program does with it other than to look for an element there, or to draw one, needs a map.
 
@@ -202,7 +202,7 @@ class LinkStep(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class LinkedFrom:
-    """What is found at a place, as what its elements lead to.
+    """A way to find an element: begin at an element whose area holds the place, then follow links.
 
     Attributes:
         kind: The kind of the elements in whose areas the place is.
@@ -214,7 +214,7 @@ class LinkedFrom:
 
 
 class AbstractOccupancy(Occupancy):
-    """Any element of a kind at each point, or none.
+    """A look-up over an abstract map. Option 0 is the element at a point, option 1 is none.
 
     Attributes:
         kind: The kind.
@@ -240,7 +240,7 @@ class AbstractOccupancy(Occupancy):
 
     @property
     def is_found_itself(self) -> bool:
-        """Whether the elements are found in areas that the map calls their own, and nowhere else."""
+        """Whether the element is found by its own area alone; false for sections, as an uncut lane is one, too."""
         return self.starts == (LinkedFrom(self.kind),) and self.kind != "lane_section"
 
     def through(self, link: str, *, within: float | None = None, is_drawn: bool = False) -> AbstractOccupancy:
@@ -257,14 +257,14 @@ class AbstractOccupancy(Occupancy):
         return AbstractOccupancy(f"{self.name}.{link}", kind, starts, is_drawn=is_drawn or self.is_drawn)
 
     def leads_to(self, other: AbstractOccupancy) -> bool:
-        """Whether what this finds leads to what another one finds."""
+        """Whether another look-up is this one, followed by more links or by none."""
         pairs = list(zip(self.starts, other.starts, strict=False))
         same = len(self.starts) == len(other.starts) and all(one.kind == two.kind for one, two in pairs)
         return same and all(two.links[: len(one.links)] == one.links for one, two in pairs)
 
     @property
     def layers(self) -> tuple[Layer, ...]:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """Those of one map."""
+        """Raise `NeedsMapError`: each map has its own."""
         raise NeedsMapError
 
     @property
@@ -278,17 +278,17 @@ class AbstractOccupancy(Occupancy):
         return self.starts[0].kind in ("lane", "lane_section")
 
     def near(self, boxes: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-        """Anything may lie in a box."""
+        """Pair each box with option 0 (the element) and option 1 (none); both arrays have shape (2 n,)."""
         numbers = np.arange(len(boxes), dtype=np.intp)
         return np.concatenate((numbers, numbers)), np.repeat([0.0, 1.0], len(boxes))
 
     def __reduce__(self) -> NoReturn:
-        """No copy over a map has it."""
+        """Refuse to be copied: a scenario over a real map has look-ups of that map instead."""
         raise TypeError(f"{self.name} is of no map")
 
 
 def led_kind(kind: str, link: str) -> str:
-    """The kind of what a link or a list leads to from elements of a kind."""
+    """The kind of the elements that a link leads to, given the kind that it starts from."""
     return kind if link == AHEAD else {**LINKS.get(kind, {}), **LISTS.get(kind, {})}[link]
 
 

@@ -1,4 +1,4 @@
-"""How elements of a map hang together, as a relation: which elements each attribute leads to.
+"""The links between elements of a map, as rows: an element, an attribute, and an element that it leads to.
 
 It has the attributes that lead to one element at most, those that are lists of elements, and the lanes ahead of each
 lane. What they lead to is the same as in a network of the same features; here each is a row, so that many maps can be
@@ -18,16 +18,16 @@ from scenicq.geometry.network_builder import link as link_elements
 __all__ = ["AHEAD", "AHEAD_M", "DIRECTS", "IS_SECTION", "LINKS", "LISTS", "Link", "find_link", "links_of"]
 
 AHEAD = "lanesAhead"
-"""The link from each lane to itself and the lanes that it leads to, with how far behind its end each begins."""
+"""The link from each lane to itself and to the lanes that it leads to; `Link.begins` says how far ahead."""
 
 AHEAD_M = 100.0
-"""Metres up to which lanes ahead are linked; programs that ask for more read every map."""
+"""Metres from a lane's end within which a lane ahead must begin. Programs that ask for more read every map."""
 
 DIRECTS = "directs"
-"""The link from each lane to a group or road that has the direction of the lane where it is in the lane."""
+"""The link from a lane to the group or road that contains it and takes its direction there."""
 
 IS_SECTION = "section"
-"""The link from each lane section to itself: a lane that the map does not cut is its own, and has no other name."""
+"""The link from each lane section to itself. An uncut lane is its own only section, under the name of the lane."""
 
 LINKS: Mapping[str, Mapping[str, str]] = {
     "lane": {"group": "lane_group", "road": "road"},
@@ -45,7 +45,7 @@ LINKS: Mapping[str, Mapping[str, str]] = {
     "sidewalk": {"road": "road"},
     "shoulder": {"road": "road"},
 }
-"""For each kind of elements the links that start there, each with the kind that it leads to."""
+"""By kind of element: the attributes that lead to one element at most, each with the kind of its target."""
 
 LISTS: Mapping[str, Mapping[str, str]] = {
     "lane": {"successors": "lane", "predecessors": "lane", "adjacentLanes": "lane", "sections": "lane_section"},
@@ -54,10 +54,10 @@ LISTS: Mapping[str, Mapping[str, str]] = {
     "road": {"lanes": "lane"},
     "intersection": {"lanes": "lane", "incomingLanes": "lane", "outgoingLanes": "lane", "roads": "road"},
 }
-"""For each kind of elements the lists that they have, each with the kind of what is in it: a link to each of these."""
+"""By kind of element: the attributes that are lists, each with the kind of its items. Each item has a link."""
 
 _NEEDED = frozenset({"laneToLeft", "laneToRight", "fasterLane", "slowerLane", "opposite"})
-"""Links that there is no scene without; with an underscore, they lead to None."""
+"""Links whose absence excludes the scene. The attribute with an underscore is None there instead."""
 
 
 class Link(NamedTuple):
@@ -79,7 +79,7 @@ class Link(NamedTuple):
 
 
 def find_link(kind: str, attribute: str) -> tuple[str, bool] | None:
-    """The link that an attribute of the elements of a kind is, and whether there is no scene where there is none.
+    """Find the link that an attribute reads, and whether scenes without its target are excluded.
 
     Args:
         kind: The kind.
@@ -133,7 +133,7 @@ def links_of(features: Sequence[MapFeature]) -> Iterator[Link]:
 
 
 def _region(element: NetworkElement) -> str:
-    """What the map calls an element's area: that of a lane that is not cut is that of its only section, too."""
+    """The name of an element's region. The only section of an uncut lane has the region of the lane."""
     if isinstance(element, LaneSection) and element.properties is element.lane.properties:
         return element.lane.id
     return element.id
