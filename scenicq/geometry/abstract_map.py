@@ -60,10 +60,8 @@ class AbstractNetwork(Network):
 class AbstractElement(NetworkElement):
     """The unknown element of one kind at one place. It may be the element at another place, too, so it has no hash.
 
-    Whether it is that at another place is not known, so that it has no hash.
-
     Attributes:
-        found: What the elements are at each place.
+        found: The look-up that finds it.
     """
 
     def __init__(self, found: AbstractOccupancy) -> None:
