@@ -125,7 +125,7 @@ def work_folder(tmp_path: Path, kind: str, crossroads: Path) -> Path:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.one_in(10)
+@pytest.mark.one_in(20)
 @pytest.mark.timeout(1800)
 def test_any_step_may_be_refused(kind, run, refusals, crossroads, made, tmp_path, monkeypatch):
     """The n-th, for each n until there is none."""

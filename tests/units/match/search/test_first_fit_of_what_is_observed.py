@@ -148,7 +148,7 @@ def _verdicts(dataset: Dataset, text: str, *, prefilter: bool, proofs: bool = Tr
 
 @pytest.mark.parametrize("seed", range(12))
 @pytest.mark.one_in(12)
-def test_what_is_not_observed_is_told_of_many_as_of_each(tmp_path, monkeypatch, seed):
+def test_what_is_not_observed_is_told_of_many_as_of_each(tmp_path, monkeypatch, seed, rounds):
     dataset = _uncertain(tmp_path / "d", seed)
     unknown = searched = 0
     undecided = VerdictBuilder.undecided
@@ -158,7 +158,8 @@ def test_what_is_not_observed_is_told_of_many_as_of_each(tmp_path, monkeypatch, 
         searched += 1
         return undecided(*args)
 
-    for roles, condition in sorted(UNCERTAIN):
+    every = sorted(UNCERTAIN)
+    for roles, condition in every if rounds(99) == 99 else every[1::3]:
         text = f"{ANYWHERE}{ROLES[roles]}require {condition}\n".replace("facing A", "facing Range(0, 360) deg")
         with monkeypatch.context() as patch:
             patch.setattr(VerdictBuilder, "undecided", counted)
@@ -175,6 +176,6 @@ def test_what_is_not_observed_is_told_of_many_as_of_each(tmp_path, monkeypatch, 
         left = {frame: verdict for frame, verdict in together.items() if isinstance(verdict, Match | Unknown)}
         assert left == {frame: sifted[frame] for frame in left}, text
         unknown += sum(isinstance(verdict, Unknown) for verdict in together.values())
-    assert unknown > 10
+    assert unknown > 3
     # they are looked at twice
     assert searched < unknown
