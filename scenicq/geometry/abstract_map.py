@@ -116,11 +116,11 @@ class AbstractArea(PolygonSet):
     """
 
     def __init__(self, found: AbstractOccupancy, orientation: RoadDirection | None = None) -> None:
-        """Take what they are.
+        """Stand for the area of what a look-up finds.
 
         Args:
-            found: That.
-            orientation: The direction there, where it is not that of each element.
+            found: The look-up.
+            orientation: The headings inside; None for the element's own.
         """
         name = f"any {found.kind}"
         own = AbstractDirection(f"orientation of {name}") if orientation is None else orientation

@@ -117,6 +117,7 @@ class TrackBlock:
             (np.repeat(np.arange(n), np.diff(self.object_starts)), np.arange(n), [-1])
         )
         self._numbers: dict[str, Numbers] = {}
+        self._recording_names: dict[int, str] = {}
         self._said: tuple[NDArray[np.int64], list[Mapping[str, Any]]] | None = None
         self._categories: tuple[NDArray[np.int64], list[str]] | None = None
         self._tracks: Integers | None = None
@@ -412,7 +413,10 @@ class TrackBlock:
 
     def name(self, recording: int) -> str:
         """The name of a recording."""
-        return self._labels.texts("recording", np.array([self.first_label + self.runs[recording][0]]))[0]
+        if recording not in self._recording_names:
+            first = np.array([self.first_label + self.runs[recording][0]])
+            self._recording_names[recording] = self._labels.texts("recording", first)[0]
+        return self._recording_names[recording]
 
     def seconds(self, label: int) -> float:
         """The time of a label since the first of its recording."""

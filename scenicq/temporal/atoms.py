@@ -52,6 +52,7 @@ from scenicq.forest.temporal import Atom
 from scenicq.forest.unobserved import certain_and_possible, is_only_observed
 from scenicq.forest.walk import children, is_leaf, leaves, postorder
 from scenicq.limits import LIMITS
+from scenicq.match.problem.observation import rule_of_courses
 from scenicq.temporal.grouping import group_equal
 from scenicq.temporal.samples import FIXED, BoundSamples, RoleSamples, is_moving
 from scenicq.temporal.truth import FALSE, TRUE, UNKNOWN, Truth
@@ -376,23 +377,18 @@ class AtomColumns:
         samples = self.samples
         if not isinstance(samples, BoundSamples) or not len(samples):
             return Column(np.full(1, np.nan), np.full(1, UNOBSERVED))
+        rules = rule_of_courses(self.scenario)
         if not self._elements:
-            self._elements += samples.pieces(self._rules)
+            self._elements += samples.pieces(rules)
         found: list[Column] = []
         for first, end, elements in self._elements:
             look()
             # those of many samples are not kept
-            there = elements or samples.at(np.arange(first, end)).elements(self._rules)
+            there = elements or samples.at(np.arange(first, end)).elements(rules)
             rows = np.arange(first, end)
             mine = [each if _is_one(each) else take_rows(each, rows, len(samples)) for each in inputs]
             found.append(among_column(node, mine, there))
         return found[0] if len(found) == 1 else concatenate(found)
-
-    @property
-    def _rules(self) -> LaneCourse | None:
-        """How the courses of label objects without a role are made, if the scenario asks for any."""
-        given = (each.properties.get(COURSE) for each in self.scenario.objects)
-        return next((each.value for each in given if each and isinstance(each.value, LaneCourse)), None)
 
     def _observed_at(self, node: Feature, samples: NDArray[np.int64]) -> Column:
         """What is observed of a feature at some samples."""

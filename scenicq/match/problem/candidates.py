@@ -17,7 +17,13 @@ from scenicq.limits import LIMITS, limit_exceeded
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.bipartite_matching import Slot, matchable
 from scenicq.match.problem.constraints import Signature
-from scenicq.match.problem.observation import course_rules, observe, observe_course, observe_params
+from scenicq.match.problem.observation import (
+    course_rules,
+    observe,
+    observe_course,
+    observe_params,
+    rule_of_courses,
+)
 from scenicq.match.verdict import Cause
 from scenicq.store.classes import Granularity, class_matches
 from scenicq.store.labels import Label
@@ -184,14 +190,15 @@ def prepare_label(
     ranks = rank_by_distance(label, ego, candidates.values())
     candidates = {index: tuple(sorted(numbers, key=ranks.__getitem__)) for index, numbers in candidates.items()}
     seen = [*map(observe, label_objects)]
-    every_rule = course_rules(scenario)
-    for index, rules in every_rule.items():
+    for index, rules in course_rules(scenario).items():
         for number in candidates.get(index, (ego,)):
             course = observe_course(label, label_objects[number], rules)
             if course is not None:
                 seen[number] = {**seen[number], COURSE: course}
-    rules = next(iter(every_rule.values()), None)
-    return LabelProblem(label, ego, tuple(seen), observe_params(label), candidates, ranks, disc, options.classes, rules)
+    return LabelProblem(
+        label, ego, tuple(seen), observe_params(label), candidates, ranks, disc, options.classes,
+        rule_of_courses(scenario),
+    )  # fmt: skip
 
 
 def candidates_of(

@@ -14,7 +14,7 @@ from scenicq.store.recorded_tracks import EGO
 
 __all__ = [
     "IN_COLUMNS", "course_rules", "course_without_role", "observe", "observe_course", "observe_params",
-    "observed_names",
+    "observed_names", "rule_of_courses",
 ]  # fmt: skip
 
 IN_COLUMNS = frozenset({
@@ -61,6 +61,11 @@ def course_rules(scenario: Scenario) -> dict[int, LaneCourse]:
     return {index: each.value for index, each in given.items() if each and isinstance(each.value, LaneCourse)}
 
 
+def rule_of_courses(scenario: Scenario) -> LaneCourse | None:
+    """How courses are made, also those of label objects without a role; None where a scenario asks for none."""
+    return next(iter(course_rules(scenario).values()), None)
+
+
 def observe_course(label: Label, label_object: LabelObject, rules: LaneCourse) -> CoursePlace | None:
     """The course that a label object drives; None where nothing but the label itself is known."""
     if label.recorded is None:
@@ -70,8 +75,9 @@ def observe_course(label: Label, label_object: LabelObject, rules: LaneCourse) -
     make = partial(label.recorded.course, rules.network, rules.gap_s, label.recording, label.frame, track, place)
     if label_object is not label.ego or rules.gap_s != GAP_S:
         return make()
-    known = {(each.x, each.y): each.on_ego_course for each in label.objects if each.on_ego_course is not None}
-    return StoredCourse(lambda: known, make) if known else make()
+    return StoredCourse(
+        lambda: {(each.x, each.y): each.on_ego_course for each in label.objects if each.on_ego_course is not None}, make
+    )
 
 
 def course_without_role(label: Label, label_object: LabelObject, rules: LaneCourse | None) -> CoursePlace | None:

@@ -171,6 +171,19 @@ class _Failure:
     numbers: tuple[int, ...]
 
 
+@dataclass(frozen=True, slots=True)
+class _PassedOver:
+    """Numbers of labels, noted while what is open is passed over.
+
+    Attributes:
+        opened: Those of which something was open.
+        settled: Those whose roles are filled, and those of which something is not clear.
+    """
+
+    opened: set[int] = field(default_factory=set[int])
+    settled: set[int] = field(default_factory=set[int])
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class FirstFit:
     """A plan whose groups all have closed forms.
@@ -204,9 +217,9 @@ class FirstFit:
         Raises:
             Exhausted: The time is used up.
         """
-        opened, settled = set[int](), set[int]()
-        yield from self._fill(rows, options, lookups, opened, settled)
-        left = [row for row in rows if row.number in opened and row.number not in settled]
+        passed = _PassedOver()
+        yield from self._fill(rows, options, lookups, passed)
+        left = [row for row in rows if row.number in passed.opened - passed.settled]
         if left:
             yield from self._fill(left, options, lookups)
 
@@ -215,8 +228,7 @@ class FirstFit:
         rows: Sequence[LabelRow],
         options: MatchOptions,
         lookups: MapLookups,
-        opened: set[int] | None = None,
-        settled: set[int] | None = None,
+        passed: _PassedOver | None = None,
     ) -> Iterator[FilledBatch | FailedBatch | OpenBatch]:
         """As `fill`, without what is open, or with that alone.
 
@@ -224,9 +236,7 @@ class FirstFit:
             rows: Labels of the plan.
             options: Tolerance and radius.
             lookups: What is known of the map.
-            opened: Gets the numbers of labels for which something was open and passed over; None: what is open is
-                taken for what holds.
-            settled: Gets the numbers of labels whose roles are filled, and of those of which something is not clear.
+            passed: Takes what is passed over; None: what is open is taken for what holds.
         """
         todo = [_Batch(self, rows, [(0,)] * len(rows))]
         while todo:
@@ -239,30 +249,29 @@ class FirstFit:
                     continue
                 if fails is not False:
                     failing = batch.where(fails)
-                    if len(self.order) <= 2 and opened is not None:
+                    if len(self.order) <= 2 and passed is not None:
                         failing.note((depth, place), form)
-                        yield from failing.lost(options, lookups, opened)
+                        yield from failing.lost(options, lookups, passed.opened)
                     todo += failing.with_next_candidate()
-                if open_ is not False and opened is not None:
-                    passed = batch.where(open_)
-                    opened.update(row.number for row in passed.rows)
-                    todo += passed.with_next_candidate()
+                if passed is not None:
+                    passed.settled.update(batch.unclear(holds, fails, open_))
+                if open_ is not False and passed is not None:
+                    opened = batch.where(open_)
+                    passed.opened.update(row.number for row in opened.rows)
+                    todo += opened.with_next_candidate()
                 elif open_ is not False:
                     batch.note_open(open_, self.plan.groups.index(group))
                     holds = _either(holds, open_)
-                if settled is not None:
-                    settled.update(batch.unclear(holds, fails, open_))
                 if holds is False:
                     break
                 batch = batch.where(holds)
             else:
                 if depth < len(self.order):
                     todo += batch.with_next_role()
-                elif opened is None:
+                elif passed is None:
                     yield batch.opened()
                 else:
-                    if settled is not None:
-                        settled.update(row.number for row in batch.rows)
+                    passed.settled.update(row.number for row in batch.rows)
                     yield batch.filled()
 
 

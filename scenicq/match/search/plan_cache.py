@@ -9,7 +9,7 @@ from scenicq.forest.scenario import Scenario
 from scenicq.match.options import MatchOptions
 from scenicq.match.problem.candidates import Candidates, candidates_of, sort_by_distance
 from scenicq.match.problem.constraints import Signature, build_groups, relevant_properties
-from scenicq.match.problem.observation import course_rules
+from scenicq.match.problem.observation import rule_of_courses
 from scenicq.match.problem.symmetry import interchangeable, shape_of
 from scenicq.match.search.first_fit import FirstFit, LabelRow, first_fit_of, signature_of
 from scenicq.match.search.group_plan import MatchPlan, make_plan
@@ -87,7 +87,7 @@ class PlanCache:
             fixed_roles: Ids of the label objects that play certain roles, by the names of the roles.
         """
         options = self.options
-        courses = next(iter(course_rules(self.scenario).values()), None)
+        courses = rule_of_courses(self.scenario)
         found: dict[FirstFit, list[LabelRow]] = {}
         if options.method != "auto" or options.exact or options.ego != "label":
             return found

@@ -221,30 +221,30 @@ class Decider:
             return BlockOutcome(missed, [], named)
         if compiled.plan.decision and not self.all_matches:
             return BlockOutcome(missed, self._partly_decided(compiled), named)
-        return BlockOutcome(missed, self._matched(self._left(compiled)), named)
+        return BlockOutcome(missed, self._matched(self._left(compiled, observed=compiled.observed)), named)
 
     def _partly_decided(self, compiled: CompiledMap) -> Iterator[list[Result]]:
         """The results of the frames that the prefilter has left, where SQL tells some of them."""
         rows = decided_frames(self.connection, compiled.plan.decision, LABELS, compiled.plan.left)
         left = np.array([number for number, told, *_ in rows if not told], dtype=np.int64)
-        asked = self._matched(self._left(compiled, left) if len(left) else iter(()))
+        asked = self._matched(self._left(compiled, left, observed=compiled.observed) if len(left) else iter(()))
         verdicts: dict[int, Verdict] = {MATCHING: Match({}, {}), UNOBSERVED: Unknown(REASON, Cause(""))}
         none = dict[str, str]()
         for _, told, frame, recording, time in rows:
             yield [Result(frame, recording, time, verdicts[told], none)] if told else next(asked)
 
-    def _left(self, compiled: CompiledMap, among: NDArray[np.int64] | None = None) -> Iterator[Candidate]:
+    def _left(
+        self, compiled: CompiledMap, among: NDArray[np.int64] | None = None, *, observed: frozenset[str] | None
+    ) -> Iterator[Candidate]:
         """The labels that the prefilter has left, with as much of each as the matcher looks at."""
-        motion, observed = compiled.motion, compiled.observed
-        recorded, whole = self.dataset.recorded, compiled.whole
         return candidates(
             self.connection,
             compiled.plan,
-            motion=motion,
+            motion=compiled.motion,
             observed=observed,
             among=among,
-            recorded=recorded,
-            whole=whole,
+            recorded=self.dataset.recorded,
+            whole=compiled.whole,
             on_course=compiled.on_course,
         )
 
@@ -271,20 +271,14 @@ class Decider:
                 if not kept:
                     keep_players(self.dataset, connection, plan, block, players)
                     kept.append(True)
-                return candidates(
-                    connection, plan, motion=compiled.motion, among=wanted, recorded=self.dataset.recorded,
-                    whole=compiled.whole, on_course=compiled.on_course,
-                )  # fmt: skip
+                return self._left(compiled, wanted, observed=None)
         else:
             missed = run_prefilter(self.dataset, connection, plan, block)
             if plan.roles and (missed < 0).any():
                 rows = candidate_rows(connection, plan)
 
             def read(wanted: NDArray[np.int64]) -> Iterator[Candidate]:
-                return candidates(
-                    connection, plan, motion=compiled.motion, among=wanted, recorded=self.dataset.recorded,
-                    whole=compiled.whole, on_course=compiled.on_course,
-                )  # fmt: skip
+                return self._left(compiled, wanted, observed=None)
 
         left = Survivors(every[missed < 0], rows, plan.roles or (), read)
         if not len(left.labels):

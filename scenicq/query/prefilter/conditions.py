@@ -14,9 +14,10 @@ from scenicq.errors import Span
 from scenicq.forest import build
 from scenicq.forest.among import asks_each_once, asks_others
 from scenicq.forest.groups import PARAMS, Comparison, Condition, Group
-from scenicq.forest.nodes import Logic, LogicOp, Node, PointIn, Select
+from scenicq.forest.nodes import Node, PointIn, Select
 from scenicq.forest.scenario import Scenario
 from scenicq.forest.unobserved import is_only_observed
+from scenicq.forest.value_numbers import without_negation
 from scenicq.forest.walk import conjuncts, postorder
 from scenicq.geometry.abstract_map import AbstractOccupancy
 from scenicq.geometry.network import Network
@@ -174,13 +175,14 @@ def _told_apart(
     if len(group.constraints) != 1 or not isinstance(group.constraints[0], Condition):
         return proved
     possible, certain = (each.constraints[0].expression for each in (group, group.certain_group))
-    parts = [*conditions_of(certain)]
     asking = asks_others(possible)
     # what two conditions on others have in common takes a search; what is known of both kinds, too
     if asking is not (possible is certain) or not asks_each_once(possible):
         return proved
     holds = [each for part in conditions_of(possible) for each in _possibly(part, reader, scenario, classes)]
-    fails = [[*_possibly(_opposite(part), reader, scenario, classes)] for part in parts]
+    parts = map(without_negation, conditions_of(certain))
+    opposites = [build.opposite(base) if positive else base for base, positive in parts]
+    fails = [[*_possibly(part, reader, scenario, classes)] for part in opposites]
     told = [*proved, *holds, *(each for some in fails for each in some)]
     about = {index for each in told for index in each.objects}
     if len(about) > 1 or any(each.region for each in told):
@@ -188,12 +190,6 @@ def _told_apart(
     failing = any_of([all_of([each.sql for each in some]) for some in fails])
     open_ = all_of([*(each.sql for each in holds), failing])
     return [ColumnCondition(tuple(about), all_of([each.sql for each in proved]), open=open_)]
-
-
-def _opposite(part: Node) -> Node:
-    """The opposite of a condition, without negations of negations."""
-    is_negation = isinstance(part, Logic) and part.op is LogicOp.NOT
-    return part.args[0] if isinstance(part, Logic) and is_negation else build.opposite(part)
 
 
 def _possibly(
